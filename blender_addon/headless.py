@@ -24,11 +24,15 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any, NoReturn
 
+if not __package__:  # run by a Blender program as a script: come back as a module of the package
+    sys.path.insert(0, str(Path(__file__).resolve().parent.parent))
+    from blender_addon import headless
+
+    sys.exit(headless.main(headless.arguments()))
+
+from .headless_words import HeadlessError, fitted_slots, pictures
+
 EXIT_CODES = {"ok": 0, "bad_input": 2}
-
-
-class HeadlessError(Exception):
-    """The command cannot be done; the message is one sentence for the user."""
 
 
 class _Parser(argparse.ArgumentParser):
@@ -36,10 +40,10 @@ class _Parser(argparse.ArgumentParser):
         raise HeadlessError(f"{self.prog}: {message}.")
 
 
-def main(arguments: Sequence[str]) -> int:
+def main(words: Sequence[str]) -> int:
     """Do one command; prints the JSON line and returns the exit code."""
     try:
-        chosen = _parser().parse_args(arguments)
+        chosen = _parser().parse_args(words)
         answer = {"status": "ok", "sentence": "Done."} | chosen.run(chosen)
     except HeadlessError as error:
         answer = {"status": "bad_input", "sentence": str(error)}
@@ -58,7 +62,7 @@ def export(chosen: argparse.Namespace) -> dict[str, Any]:
     from .export.nodes.target_shader import leaf_called
     from .result.local_copy import unwritable
 
-    fitted = _fitted_slots(bpy, chosen)
+    fitted = fitted_slots(bpy, chosen)
     several, obj = len(fitted) > 1, fitted[0].object
     obj.active_material_index = fitted[0].slot  # of the open copy of the file, which is not saved
     try:
@@ -80,7 +84,7 @@ def export(chosen: argparse.Namespace) -> dict[str, Any]:
             bpy.context,
             obj,
             Path(chosen.job).absolute(),
-            reference=_pictures(chosen),
+            reference=pictures(chosen),
             fit=fit,
             reference_view=chosen.reference_view,
             upright=chosen.upright,
@@ -89,69 +93,6 @@ def export(chosen: argparse.Namespace) -> dict[str, Any]:
     except ExportError as error:
         raise HeadlessError(str(error)) from error
     return {"job": str(report.folder), "material": obj.active_material.name, "notes": list(report.notes)}
-
-
-def _fitted_slots(bpy: Any, chosen: argparse.Namespace) -> list[Any]:
-    """The slots whose materials are fitted: that of --object, or those of each --target."""
-    from .export.fitted_slot import FittedSlot
-
-    if chosen.object is not None:
-        obj = _object(bpy, chosen, chosen.object)
-        return [FittedSlot.active(obj)]
-    found = []
-    for text in chosen.target:
-        try:
-            given = json.loads(text)
-            name, slot, material = given["object"], given.get("slot"), given.get("material")
-        except (ValueError, TypeError, KeyError, AttributeError) as error:
-            raise HeadlessError(f"--target is no JSON object with object, slot or material ({error}).") from error
-        obj = _object(bpy, chosen, name)
-        names = [each.material.name if each.material is not None else "none" for each in obj.material_slots]
-        if material is not None and material not in names:
-            raise HeadlessError(f"Object {name!r} has no material {material!r}: it has {', '.join(names) or 'none'}.")
-        if slot is not None and not 1 <= slot <= len(names):
-            raise HeadlessError(f"Object {name!r} has no slot {slot}: it has {len(names)}.")
-        active = obj.active_material_index if slot is None else slot - 1
-        found.append(FittedSlot(obj, active if material is None else names.index(material)))
-    return found
-
-
-def _object(bpy: Any, chosen: argparse.Namespace, name: str) -> Any:
-    obj = bpy.context.scene.objects.get(name)
-    if obj is None:
-        names = ", ".join(o.name for o in bpy.context.scene.objects if o.type == "MESH") or "none"
-        elsewhere = [scene.name for scene in bpy.data.scenes if name in scene.objects]
-        where = f"it is in the scene {elsewhere[0]!r}, which is not the active one" if elsewhere else ""
-        raise HeadlessError(
-            f"{chosen.file} has no object {name!r} in its scene {bpy.context.scene.name!r}: "
-            f"{where or f'its mesh objects are: {names}'}."
-        )
-    return obj
-
-
-def _pictures(chosen: argparse.Namespace) -> Any:
-    """The reference, or the pictures of --picture."""
-    from .export.reference.picture_setup import PictureSetup
-
-    if chosen.reference is not None:
-        return chosen.reference.absolute()
-    try:
-        given = [json.loads(text) for text in chosen.picture]
-        parts = [_part(one["reference"], one.pop("part", {})) for one in given]
-        return [PictureSetup(**one | {"reference": part}) for one, part in zip(given, parts, strict=True)]
-    except (ValueError, TypeError, KeyError) as error:
-        raise HeadlessError(f"--picture is no JSON object with the fields of a PictureSetup ({error}).") from error
-
-
-def _part(reference: str | Path, part: dict[str, Any]) -> Any:
-    """A picture, of which a part counts where one is given."""
-    from .export.reference.counted_part import WHOLE, CountedPart
-
-    path = Path(reference).absolute()
-    if not part:
-        return path
-    mask = Path(part["mask"]).absolute() if part.get("mask") else None
-    return CountedPart(path, tuple(part.get("crop", WHOLE)), mask, part.get("alpha", False))
 
 
 def apply(chosen: argparse.Namespace) -> dict[str, Any]:
@@ -234,10 +175,30 @@ def check(chosen: argparse.Namespace) -> dict[str, Any]:
 
 
 def render(chosen: argparse.Namespace) -> dict[str, Any]:
-    """Render the scene with Cycles into a scene-linear EXR at the scene's resolution."""
+    """Render the scene with Cycles into a scene-linear EXR at the scene's resolution.
+
+    With `--target` and `--material` as if that material were everywhere in the place of the target's.
+    """
     bpy = _open(chosen.file)
     _watch_parent(chosen.parent)
-    return _render(bpy, chosen)
+    if not chosen.target:
+        return _render(bpy, chosen)
+    from .export.findings import ExportError
+    from .export.reference.picture_setup import PictureSetup, shown
+
+    (fitted,) = fitted_slots(bpy, chosen)
+    material = bpy.data.materials.get(chosen.material)
+    if material is None:
+        raise HeadlessError(f"{chosen.file} has no material {chosen.material!r}: choose one of the file.")
+    fitted.material.user_remap(material)
+    try:
+        setup = PictureSetup(chosen.out, **json.loads(chosen.picture))
+        with shown(bpy.context, setup, fitted.object, own_size=False):
+            return _render(bpy, chosen)
+    except (ValueError, TypeError) as error:
+        raise HeadlessError(f"--picture is no JSON object with the fields of a PictureSetup ({error}).") from error
+    except ExportError as error:
+        raise HeadlessError(str(error)) from error
 
 
 def _render(bpy: Any, chosen: argparse.Namespace) -> dict[str, Any]:
@@ -265,7 +226,7 @@ def _render(bpy: Any, chosen: argparse.Namespace) -> dict[str, Any]:
     rendered = Path(bpy.app.tempdir) / "render.exr"
     scene.render.filepath = str(rendered)
     scene.render.use_file_extension = False
-    bpy.ops.render.render(write_still=True)
+    bpy.ops.render.render(write_still=True, scene=scene.name)
     try:
         shutil.move(rendered, chosen.out.absolute())
     except OSError as error:
@@ -321,8 +282,12 @@ def _parser() -> argparse.ArgumentParser:
         command.add_argument("--seed", type=int, default=0)
         command.add_argument("--engine", default="cycles", choices=("cycles", "scene"), help="scene: the file's own")
         command.add_argument("--parent", type=int, default=0, help="end when this process is not the parent any more")
+        command.add_argument("--material", default="")
+        if name == "render":
+            command.add_argument("--target", action="append", help="whose material --material replaces, as for export")
+            command.add_argument("--picture", default="{}", help="with --target: fields of a PictureSetup as JSON")
+            command.set_defaults(object=None)
     command.add_argument("--job", required=True, type=Path)
-    command.add_argument("--material", default="")
     command.set_defaults(animated="replace", make_local=True)  # of a copy that is thrown away
     command = add("demo-scene", demo_scene)
     command.add_argument("--scene-seed", type=int, default=0)
@@ -359,7 +324,7 @@ def _save(path: Path) -> None:
         raise HeadlessError(f"{path} cannot be written ({error.strerror or error}): choose another place.") from error
 
 
-def _arguments() -> list[str]:
+def arguments() -> list[str]:
     """Those after `--` of a Blender command line, else all."""
     return sys.argv[sys.argv.index("--") + 1 :] if "--" in sys.argv else sys.argv[1:]
 
@@ -387,9 +352,4 @@ def _leave(code: int) -> NoReturn:
 
 
 if __name__ == "__main__":
-    if not __package__:  # run by a Blender program as a script: come back as a module of the package
-        sys.path.insert(0, str(Path(__file__).resolve().parent.parent))
-        from blender_addon import headless
-
-        sys.exit(headless.main(_arguments()))
-    _leave(main(_arguments()))
+    _leave(main(arguments()))

@@ -284,6 +284,7 @@ class MFO_PG_runtime(bpy.types.PropertyGroup):
         options={"SKIP_SAVE"},
     )
     cycles_text: StringProperty()  # how far the check in Cycles is, or what it found
+    cycles_of_reference: BoolProperty()  # what is or was rendered is a reference, no check of the result
     cycles_flip: FloatProperty(default=-1.0)
     messages: CollectionProperty(type=MFO_PG_message)
     values: CollectionProperty(type=MFO_PG_row)

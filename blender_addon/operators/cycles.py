@@ -4,10 +4,15 @@
 # pyright: reportInvalidTypeForm=false
 # Blender reads properties from annotations
 
+import json
+
 import bpy
+from bpy.props import IntProperty, StringProperty
 
 from ..backend.preferences import new_job_folder
 from ..check import preflight
+from ..check.ticked_slots import ticked_slots
+from ..export.fitted_slot import FittedSlot
 from ..result import shown_result
 from ..running import cycles_check
 from ..sentences.translated import translated
@@ -16,10 +21,18 @@ from .fit_options import FitError, python_of
 _SCRIPT = {"HIDDEN", "SKIP_SAVE"}
 
 
-def _refuse_second(cls: type) -> bool:
+def _can_render(cls: type, context: bpy.types.Context) -> bool:
+    """One render at a time, of a scene with a camera, and of no mesh that is being edited."""
+    reason = ""
     if cycles_check.is_running():
-        cls.poll_message_set(translated("Cycles is rendering already; wait for it or cancel it"))  # type: ignore[attr-defined]
-    return cycles_check.is_running()
+        reason = "Cycles is rendering already; wait for it or cancel it"
+    elif context.scene.camera is None:
+        reason = "The scene has no camera; add one"
+    elif not bpy.app.background and context.mode != "OBJECT":
+        reason = "Leave Edit Mode first: what is edited is not in the copy that is rendered"
+    if reason:
+        cls.poll_message_set(translated(reason))  # type: ignore[attr-defined]
+    return not reason
 
 
 class MFO_OT_check_in_cycles(bpy.types.Operator):
@@ -32,17 +45,10 @@ class MFO_OT_check_in_cycles(bpy.types.Operator):
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
         """Only with a result, and one render at a time."""
-        if _refuse_second(cls):
-            return False
         if not context.window_manager.mfo_runtime.has_result or shown_result.result is None:
             cls.poll_message_set(translated("There is no result to render; run a fit or show an earlier result"))
             return False
-        if not bpy.app.background and context.mode != "OBJECT":
-            cls.poll_message_set(
-                translated("Leave Edit Mode first: what is edited is not in the copy that is rendered")
-            )
-            return False
-        return True
+        return _can_render(cls, context)
 
     def execute(self, context: bpy.types.Context) -> set[str]:
         """Start it; wait for it in background mode."""
@@ -67,17 +73,76 @@ class MFO_OT_render_reference(bpy.types.Operator):
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
         """Only with a camera, and one render at a time."""
-        if _refuse_second(cls):
-            return False
-        if context.scene.camera is None:
-            cls.poll_message_set(translated("The scene has no camera; add one"))
-            return False
-        return True
+        return _can_render(cls, context)
 
     def execute(self, context: bpy.types.Context) -> set[str]:
         """Start it; wait for it in background mode."""
         try:
             cycles_check.render_reference(new_job_folder(context, "reference") / "reference.exr")
+        except OSError as error:
+            self.report({"ERROR"}, translated(str(error)))
+            return {"CANCELLED"}
+        return _wait_in_background(self, context)
+
+
+class MFO_OT_render_picture(bpy.types.Operator):
+    """Render this picture in Cycles with another material of the file in the place of the one that is fitted"""
+
+    bl_idname = "mfo.render_picture"
+    bl_label = "Render with Another Material"
+    bl_options = {"REGISTER", "INTERNAL"}  # it needs a number
+
+    index: IntProperty(name="Index", description="Counted from 0", min=0, options=_SCRIPT)
+    material: StringProperty(name="Material", description="What the picture shows; it is only read")
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        """As a reference is rendered, of one material."""
+        if not _can_render(cls, context):
+            return False
+        if _fitted(context) is None:
+            cls.poll_message_set(translated("Choose the one object and material that is fitted"))
+            return False
+        return True
+
+    def invoke(self, context: bpy.types.Context, _event: bpy.types.Event) -> set[str]:
+        """Ask for the material."""
+        return context.window_manager.invoke_props_dialog(self)
+
+    def draw(self, _context: bpy.types.Context) -> None:
+        """The material, and what for."""
+        self.layout.label(text="For tests: what a fit should find is known then")
+        self.layout.prop_search(self, "material", bpy.data, "materials")
+
+    def execute(self, context: bpy.types.Context) -> set[str]:
+        """Start it; wait for it in background mode."""
+        pictures, fitted = context.scene.mfo.pictures, _fitted(context)
+        assert fitted is not None  # as `poll` has seen
+        shown, own = bpy.data.materials.get(self.material), fitted.material
+        reason = ""
+        if self.index >= len(pictures):
+            reason = f"There is no picture {self.index + 2}: the last is {len(pictures) + 1}."
+        elif shown is None:
+            reason = "Choose the material that the picture is to show."
+        elif shown == own:
+            reason = f"Material '{shown.name}' is the one that is fitted: choose the one that it should become."
+        elif not shown.users:
+            reason = (
+                f"Material '{shown.name}' is used nowhere, and no copy of the file holds it: give it a fake user (the "
+                "shield beside its name)."
+            )
+        if reason:
+            self.report({"ERROR"}, translated(reason))
+            return {"CANCELLED"}
+        entry = pictures[self.index]
+        given = {"frame": entry.frame, "camera": entry.camera, "scene": entry.scene, "exposure": entry.exposure}
+        setup = {name: getattr(value, "name", value) for name, value in given.items() if value is not None}
+        target = {"object": fitted.object.name, "slot": fitted.slot + 1}
+        words = ["--target", json.dumps(target), "--picture", json.dumps(setup), "--material", self.material]
+        number = self.index + 2
+        try:
+            out = new_job_folder(context, "reference") / f"picture_{number}.exr"
+            cycles_check.render_reference(out, number, words)
         except OSError as error:
             self.report({"ERROR"}, translated(str(error)))
             return {"CANCELLED"}
@@ -107,6 +172,15 @@ class MFO_OT_cancel_cycles(bpy.types.Operator):
         return {"FINISHED"}
 
 
+def _fitted(context: bpy.types.Context) -> FittedSlot | None:
+    """The one slot whose material is fitted; None for several or none."""
+    if context.scene.mfo.targets:
+        ticked = ticked_slots(context.scene)
+        return ticked[0] if len(ticked) == 1 else None
+    slot = FittedSlot.active(context.object) if context.object is not None else None
+    return slot if slot is not None and slot.material is not None else None
+
+
 def _wait_in_background(operator: bpy.types.Operator, context: bpy.types.Context) -> set[str]:
     if bpy.app.background:
         cycles_check.wait()
@@ -120,5 +194,6 @@ def _wait_in_background(operator: bpy.types.Operator, context: bpy.types.Context
 CLASSES = (
     MFO_OT_check_in_cycles,
     MFO_OT_render_reference,
+    MFO_OT_render_picture,
     MFO_OT_cancel_cycles,
 )

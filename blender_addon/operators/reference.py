@@ -5,7 +5,7 @@
 # Blender reads properties from annotations
 
 import bpy
-from bpy.props import StringProperty
+from bpy.props import IntProperty, StringProperty
 
 from ..check import preflight
 from ..export.reference.chosen_file import DISPLAY_SUFFIXES, LINEAR_SUFFIXES
@@ -21,16 +21,30 @@ class MFO_OT_use_reference(bpy.types.Operator):
     bl_options = {"UNDO", "INTERNAL"}
 
     filepath: StringProperty(subtype="FILE_PATH", options={"HIDDEN", "SKIP_SAVE"})
+    number: IntProperty(
+        name="Number", description="Which of several pictures, from 1", default=1, options={"HIDDEN", "SKIP_SAVE"}
+    )
 
     def execute(self, context: bpy.types.Context) -> set[str]:
         """Set the path in the scene's settings; an overlay shows the new picture."""
         scene = context.scene
+        if self.number > 1:
+            return self._use_further(scene)
         scene.mfo.reference_source, scene.mfo.reference_path = "FILE", self.filepath
         if overlay.is_shown(scene.camera):
             try:
                 overlay.show(scene)
             except RuntimeError as error:
                 self.report({"WARNING"}, translated(str(error).strip()))
+        preflight.request()
+        return {"FINISHED"}
+
+    def _use_further(self, scene: bpy.types.Scene) -> set[str]:
+        pictures = scene.mfo.pictures
+        if self.number > 1 + len(pictures):
+            self.report({"ERROR"}, translated(f"There is no picture {self.number}: the last is {1 + len(pictures)}."))
+            return {"CANCELLED"}
+        pictures[self.number - 2].path = self.filepath
         preflight.request()
         return {"FINISHED"}
 

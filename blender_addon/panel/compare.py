@@ -8,7 +8,8 @@ import bpy
 from ..pictures import comparison, previews
 from ..result import shown_result
 from ..running import cycles_check
-from .layout import GAP, UNIT, buttons_side_by_side, draw_messages, draw_numbers, draw_pictures, draw_sentence
+from .cycles_render import draw_render
+from .layout import buttons_side_by_side, draw_messages, draw_numbers, draw_pictures, draw_sentence
 
 
 class Compare:
@@ -82,17 +83,10 @@ def _draw_details(layout: bpy.types.UILayout, context: bpy.types.Context, runtim
 
 def _draw_cycles(layout: bpy.types.UILayout, context: bpy.types.Context, runtime: bpy.types.PropertyGroup) -> None:
     column = layout.column()
-    if cycles_check.is_running():
-        row = column.row()
-        draw_sentence(row, context, runtime.cycles_text, "RENDER_STILL", taken=UNIT + GAP)
-        row.operator("mfo.cancel_cycles", text="", icon="X")
-        return
-    column.operator("mfo.check_in_cycles", icon="RENDER_STILL")
-    if runtime.cycles_text:
-        failed = runtime.cycles_flip < 0.0
-        line = column.column()
-        line.alert = failed
-        draw_sentence(line, context, runtime.cycles_text, "ERROR" if failed else "INFO")  # a figure, no verdict
+    if not cycles_check.is_running() or runtime.cycles_of_reference:
+        column.operator("mfo.check_in_cycles", icon="RENDER_STILL")
+    if not runtime.cycles_of_reference:
+        draw_render(column, context)
     if previews.icon("cycles"):
         draw_pictures(column, context, ("reference", "cycles", "cycles_difference"), clickable=True)
     if previews.icon("engine"):

@@ -14,6 +14,7 @@ from ..pictures import overlay
 from ..running import running_job
 from ..sentences.translated import translated, word
 from ..text_width import text_width, wrapped
+from .cycles_render import draw_render
 from .layout import (
     BOX,
     BUTTON,
@@ -85,6 +86,8 @@ def _draw_pictures(column: bpy.types.UILayout, context: bpy.types.Context, setti
         _draw_what_it_shows(box, context, picture, picture.path, index)
         draw_part(box, context, picture.part, index + 2)
     column.operator("mfo.add_picture", text="Add Another Picture", icon="ADD")
+    if context.window_manager.mfo_runtime.cycles_of_reference:
+        draw_render(column, context)
 
 
 def _draw_path(
@@ -135,6 +138,8 @@ def _draw_what_it_shows(
     row.prop(picture, "frame")
     if index is not None:
         _draw_path(rest, context, picture, "path", taken=taken)
+        if not path:
+            rest.operator("mfo.render_picture", text="Render...", icon="RENDER_STILL").index = index
         if len(bpy.data.scenes) > 1:
             rest.prop(picture, "scene", text="", icon="SCENE_DATA")
 

@@ -11,7 +11,7 @@ import os
 import shutil
 import sys
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -82,8 +82,11 @@ def check_result(job: Path, material: str, python: Path) -> None:
     _begin(folder, steps, done)
 
 
-def render_reference(out: Path) -> None:
-    """Render the scene as it is in Cycles into the scene-linear EXR `out` and make it the reference.
+def render_reference(out: Path, number: int = 1, words: Sequence[str] = ()) -> None:
+    """Render the scene in Cycles into the scene-linear EXR `out` and make it the reference.
+
+    `number` counts the pictures of the list from 1. `words` are further options of the command `render` of
+    `headless.py`: what of the scene is rendered.
 
     Raises
     ------
@@ -95,11 +98,12 @@ def render_reference(out: Path) -> None:
         _runtime().cycles_text = ""
         window = next(iter(bpy.context.window_manager.windows), None)
         with bpy.context.temp_override(**({"window": window} if window else {})):
-            bpy.ops.mfo.use_reference("EXEC_DEFAULT", True, filepath=str(out))
+            bpy.ops.mfo.use_reference("EXEC_DEFAULT", True, filepath=str(out), number=number)
 
     out.parent.mkdir(parents=True, exist_ok=True)
     folder = make_folder("check")
-    _begin(folder, [_blender_step(folder, "render", ["--out", str(out)], "Rendering the reference")], done)
+    step = _blender_step(folder, "render", ["--out", str(out), *words], "Rendering the reference")
+    _begin(folder, [step], done, of_reference=True)
 
 
 def step() -> bool:
@@ -148,7 +152,9 @@ def close() -> None:
         _current = None
 
 
-def _begin(folder: Path, steps: list[Step], done: Callable[[list[dict[str, Any]]], None]) -> None:
+def _begin(
+    folder: Path, steps: list[Step], done: Callable[[list[dict[str, Any]]], None], *, of_reference: bool = False
+) -> None:
     global _current
     try:
         save_copy(folder / "scene.blend")
@@ -158,7 +164,7 @@ def _begin(folder: Path, steps: list[Step], done: Callable[[list[dict[str, Any]]
         raise
     atexit.register(close)
     runtime = _runtime()
-    runtime.cycles_text, runtime.cycles_flip = steps[0].label, -1.0
+    runtime.cycles_text, runtime.cycles_flip, runtime.cycles_of_reference = steps[0].label, -1.0, of_reference
     if not bpy.app.background and not bpy.app.timers.is_registered(_tick):
         bpy.app.timers.register(_tick, first_interval=TASK_TICK, persistent=True)
     redraw()

@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import json
 import math
+import shutil
 from pathlib import Path
 from types import SimpleNamespace
 
@@ -14,6 +15,7 @@ import pytest
 from blender_addon.check.checks import STOPS, TO_CHOOSE, quick_check
 from blender_addon.result import shown_result
 from blender_addon.result.job_result import JobResultError, read_job_result
+from mfo_backend.scene.image_file import read_image
 
 from . import fake_backend
 from .conftest import HEIGHT, WIDTH
@@ -202,3 +204,49 @@ def test_proposed_light_is_a_scene_of_its_own(scene: SimpleNamespace, turn: floa
 def test_a_proposal_that_is_none_is_refused(scene: SimpleNamespace, wrong: dict[str, object]) -> None:
     with pytest.raises(JobResultError):
         read_job_result(propose(scene, **wrong))
+
+
+def test_a_picture_is_rendered_with_the_material_that_a_fit_should_find(scene: SimpleNamespace) -> None:
+    """The true material glows, so that the object's pixels are its colour; `exposure` stops brighter."""
+    bpy, settings = scene.bpy, listed(scene)
+    entry, radiance = settings.pictures[0], (0.25, 0.5, 0.125)
+    entry.path, entry.exposure = "", 1.0
+    bpy.context.scene.cycles.samples, bpy.context.scene.cycles.use_denoising = 4, False
+    glaze = bpy.data.objects["Väse"].active_material
+    truth = glaze.copy()
+    truth.name = "Truth"
+    truth.node_tree.nodes.clear()
+    glow, out = (truth.node_tree.nodes.new(f"ShaderNode{kind}") for kind in ("Emission", "OutputMaterial"))
+    glow.inputs["Color"].default_value = (*radiance, 1.0)
+    truth.node_tree.links.new(glow.outputs["Emission"], out.inputs["Surface"])
+    with pytest.raises(RuntimeError, match="Choose the material that the picture is to show"):
+        bpy.ops.mfo.render_picture(index=0, material="None")
+    with pytest.raises(RuntimeError, match="'Glaze' is the one that is fitted"):
+        bpy.ops.mfo.render_picture(index=0, material="Glaze")
+    with pytest.raises(RuntimeError, match="no picture 3"):
+        bpy.ops.mfo.render_picture(index=1, material="Truth")
+    with pytest.raises(RuntimeError, match="'Truth' is used nowhere"):
+        bpy.ops.mfo.render_picture(index=0, material="Truth")
+    truth.use_fake_user = True
+
+    def glows() -> np.ndarray:
+        """Which columns of the rendered picture show how many pixels of the true material."""
+        entry.path = ""
+        assert bpy.ops.mfo.render_picture(index=0, material="Truth") == {"FINISHED"}
+        try:
+            pixels = read_image(Path(entry.path)).pixels
+        finally:
+            shutil.rmtree(Path(entry.path).parent)
+        return (np.abs(pixels / np.asarray(radiance) - 2.0).max(axis=-1) < 1e-4).sum(axis=0)
+
+    from_side = glows()
+    assert 0.05 < from_side.sum() / (WIDTH * HEIGHT) < 0.5
+    assert bpy.data.objects["Väse"].active_material == glaze
+    entry.camera = settings.first_picture.camera
+    columns = np.arange(WIDTH)
+    assert np.average(columns, weights=glows()) - np.average(columns, weights=from_side) > 1.0  # it stands further left
+    assert settings.reference_path == scene.reference
+    entry.path, entry.frame = "", 900
+    with pytest.raises(RuntimeError, match="Frame 900 is outside of the frames 1 to 250"):
+        bpy.ops.mfo.render_picture(index=0, material="Truth")
+    assert entry.path == ""

@@ -3,6 +3,9 @@
 
 # fmt: off
 LABELS = {
+    "Render this picture in Cycles with another material of the file in the place of the one that is fitted": "Rendre cette image dans Cycles avec un autre matériau du fichier à la place de celui qui est ajusté",
+    "What the picture shows; it is only read": "Ce que l'image montre ; il est seulement lu",
+    "For tests: what a fit should find is known then": "Pour des essais : ce qui est à trouver est alors connu",
     "Absorption Density": "Densité d'absorption",
     "Absorption Color": "Couleur d'absorption",
     "Metal IOR": "IOR du métal",
@@ -222,6 +225,8 @@ OPERATORS = {
     "All": "Toutes",
     "Add Picture": "Ajouter l'image",
     "Remove Picture": "Retirer l'image",
+    "Render...": "Rendre...",
+    "Render with Another Material": "Rendre avec un autre matériau",
     "Set Up Camera": "Installer la caméra",
     "Set Up Next Picture": "Installer l'image suivante",
     "Set Up Light": "Installer la lumière",

@@ -3,6 +3,9 @@
 
 # fmt: off
 LABELS = {
+    "Render this picture in Cycles with another material of the file in the place of the one that is fitted": "Dieses Bild in Cycles mit einem anderen Material der Datei anstelle des angepassten rendern",
+    "What the picture shows; it is only read": "Was das Bild zeigt; es wird nur gelesen",
+    "For tests: what a fit should find is known then": "Für Proben: was zu finden ist, ist dann bekannt",
     "Absorption Density": "Absorptionsdichte",
     "Absorption Color": "Absorptionsfarbe",
     "Metal IOR": "IOR des Metalls",
@@ -222,6 +225,8 @@ OPERATORS = {
     "All": "Alle",
     "Add Picture": "Bild hinzufügen",
     "Remove Picture": "Bild entfernen",
+    "Render...": "Rendern ...",
+    "Render with Another Material": "Mit einem anderen Material rendern",
     "Set Up Camera": "Kamera aufstellen",
     "Set Up Next Picture": "Nächstes Bild einrichten",
     "Set Up Light": "Licht einrichten",
