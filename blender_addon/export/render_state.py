@@ -129,9 +129,11 @@ def layer_collections(view_layer: bpy.types.ViewLayer) -> Iterator[bpy.types.Lay
 
 
 def _use_render_settings(item: bpy.types.Object, put: Any) -> None:
+    is_edited = _is_edited(item)
     for modifier in item.modifiers:
-        put(modifier, "show_viewport", modifier.show_render)
-        if modifier.type in RENDER_TWINS:
+        if not is_edited:
+            put(modifier, "show_viewport", modifier.show_render)
+        if modifier.type in RENDER_TWINS and not (is_edited and _is_off_while_edited(modifier)):
             viewport, render = RENDER_TWINS[modifier.type]
             put(modifier, viewport, getattr(modifier, render))
     for system in item.particle_systems:
@@ -170,12 +172,34 @@ def note_viewport(depsgraph: bpy.types.Depsgraph, findings: Findings) -> None:
                 f"Object '{original.name}' is in Sculpt Mode, where its modifiers are not as in a render: leave Sculpt "
                 "Mode before the fit."
             )
+        if _is_edited(original) and _differs_while_edited(original):
+            findings.note(
+                f"The mesh of '{original.name}' is in Edit Mode, where Cycles renders modifiers and shape keys as Edit "
+                "Mode shows them: leave it before the fit, unless the reference was made in it."
+            )
         for modifier in original.modifiers:
             if modifier.type == "NODES" and modifier.show_render and _asks_viewport(modifier.node_group):
                 findings.note(
                     f"Geometry nodes of '{original.name}' ask whether they are for the viewport (Is Viewport): the fit "
                     "has what they make there, Cycles what they make for a render."
                 )
+
+
+def _is_edited(item: bpy.types.Object) -> bool:
+    """Whether Blender evaluates an object for Edit Mode, in a render, too: its mesh is edited, by whichever object."""
+    return item.type == "MESH" and item.data.is_editmode
+
+
+def _differs_while_edited(item: bpy.types.Object) -> bool:
+    if item.data.shape_keys is not None and not item.use_shape_key_edit_mode:
+        return True
+    return any(each.show_render == _is_off_while_edited(each) for each in item.modifiers)
+
+
+def _is_off_while_edited(modifier: bpy.types.Modifier) -> bool:
+    """Whether Edit Mode leaves a modifier out; a subdivision of no levels there counts, in a render, too."""
+    shown = modifier.show_viewport and modifier.show_in_editmode
+    return not shown or (modifier.type in ("SUBSURF", "MULTIRES") and modifier.levels == 0)
 
 
 def _particles_of_render(settings: bpy.types.ParticleSettings) -> dict[str, Any]:

@@ -311,6 +311,20 @@ def _nested(rig: Rig, _: Draw) -> None:
     outer.hide_render = True
 
 
+def _edited(rig: Rig, draw: Draw) -> None:
+    """The box in Edit Mode, or another object that has its mesh."""
+    rig.box.modifiers.new("Bevel", "BEVEL").width = 0.2
+    edited = rig.box
+    if draw.random() < 0.5:
+        edited = bpy.data.objects.new("Edited", rig.box.data)
+        edited.location = (2.2, 1.4, 0.6)
+        rig.scene.collection.objects.link(edited)
+    edited.hide_set(False)
+    bpy.context.view_layer.objects.active = edited
+    edited.select_set(True)
+    bpy.ops.object.mode_set(mode="EDIT")
+
+
 def _all() -> Iterator[Setting]:
     of_viewport, of_instance = ("viewport",), ("of each instance",)
     yield Setting("instancer", _of_instancer())
@@ -348,6 +362,7 @@ def _all() -> Iterator[Setting]:
     yield Setting("on a bone", _on_a_bone)
     yield Setting("eye closed", _eye_closed)
     yield Setting("nested collections", _nested)
+    yield Setting("edited mesh", _edited)
 
 
 OWNER_SETTINGS = tuple(_all())

@@ -121,6 +121,8 @@ def recover(chosen: argparse.Namespace, material: Row) -> Row:
         child([blender, "render", str(fitted), "--seed=3", f"--out={folder}/after.exr", samples], RENDER_SECONDS)
         for name in ("before", "after", "floor"):
             judged = child(["mfo_backend", "judge", str(job), f"{folder}/{name}.exr", "--json"], FIT_SECONDS)
+            if "metrics" not in judged:
+                return row | {"why": judged["sentence"]}
             row[name] = round(judged["metrics"]["flip"], 5)
         return row
     except ChildError as error:

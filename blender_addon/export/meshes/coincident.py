@@ -11,6 +11,10 @@ from numpy.typing import NDArray
 from ..files.ply_file import TriangleMesh
 
 GRID_STEPS = 1 << 16  # across the whole scene; triangles that agree to one of these are looked at
+# Of the distance from the camera: planes so far apart are one to a ray. Measured with bpy 5.0.1 on two squares, along
+# the axes and turned: the hidden one shows in 50 to 73 % of the pixels at 0, in 4 to 32 % at 1e-7, in at most 0.3 %
+# at 3e-7 and in none at 1e-6. Larger: faces are named that do not show. Smaller: such are not named that do.
+COPLANAR = 3e-7
 CLOSE = 1e-3  # of a triangle's longest side: corners so near are in the same place
 
 
@@ -31,6 +35,39 @@ def shared_faces(places: Sequence[tuple[str, TriangleMesh]]) -> list[tuple[str, 
     owners = [np.searchsorted(ends, each[close], side="right") for each in (first, second)]
     pairs = np.unique(np.stack(owners, axis=1), axis=0)
     return list(dict.fromkeys((places[a][0], places[b][0]) for a, b in pairs))
+
+
+def lie_in(points: NDArray[np.float64], reach: NDArray[np.float64], mesh: TriangleMesh) -> bool:
+    """Whether any of some points (n, 3) lies in a triangle of a mesh, nearer than its reach (n,) to its plane."""
+    margin = reach.max()
+    low, high = points.min(axis=0) - margin, points.max(axis=0) + margin
+    if (mesh.positions.min(axis=0) > high).any() or (mesh.positions.max(axis=0) < low).any():
+        return False
+    corners = mesh.positions[mesh.triangles]
+    lowest, highest = corners.min(axis=1), corners.max(axis=1)
+    near = np.flatnonzero((lowest <= high).all(axis=1) & (highest >= low).all(axis=1))
+    corners, lowest, highest = corners[near].astype(np.float64), lowest[near], highest[near]
+    for point, own in zip(points, reach, strict=True):
+        around = (lowest <= point + own).all(axis=1) & (highest >= point - own).all(axis=1)
+        if _hold(corners[around], point, own):
+            return True
+    return False
+
+
+def _hold(corners: NDArray[np.float64], point: NDArray[np.float64], reach: float) -> bool:
+    """Whether any of some triangles (n, 3, 3) holds a point."""
+    first, second, third = (corners[:, k] for k in range(3))
+    normal = np.cross(second - first, third - first)
+    area = np.linalg.norm(normal, axis=1)
+    with np.errstate(invalid="ignore", divide="ignore"):
+        normal /= area[:, None]
+    sides = [
+        np.einsum("ij,ij->i", np.cross(b - a, point - a), normal)
+        for a, b in ((first, second), (second, third), (third, first))
+    ]
+    inside = np.min(sides, axis=0) > 0.0 if len(corners) else np.zeros(0, dtype=bool)
+    apart = np.abs(np.einsum("ij,ij->i", point - first, normal))
+    return bool(np.any(inside & (apart <= reach)))
 
 
 def _repeated(keys: NDArray[np.int64]) -> NDArray[np.int64]:

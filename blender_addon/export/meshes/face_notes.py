@@ -5,11 +5,15 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 
+import numpy as np
+from numpy.typing import NDArray
+
 from ..camera.camera_model import Camera
 from ..files.ply_file import TriangleMesh
 from ..findings import Findings
 from ..steps import Pause, Steps
 from .bent_normals import share_of_bent_normals
+from .coincident import COPLANAR, lie_in
 from .known_meshes import KnownMeshes
 
 MANY = 100_000  # triangles that windows are drawn before: what is computed with them takes a tenth of a second
@@ -33,10 +37,33 @@ def note_coincident_faces(
                 "merge them (Merge by Distance), or look for a modifier that copies them."
             )
             continue
-        findings.note(
-            f"'{first}' and '{second}' have faces in the same place: which of them is seen is left to chance, in "
-            "Cycles and in the fit."
-        )
+        findings.note(_same_place(first, second))
+
+
+def note_coplanar_faces(
+    seen: Mapping[str, NDArray[np.float64]],
+    places: Sequence[tuple[str, TriangleMesh]],
+    camera: Camera,
+    findings: Findings,
+) -> Steps[None]:
+    """Report objects with faces in faces of an object that is fitted, of which `seen` has points (n, 3)."""
+    if sum(len(mesh.triangles) for _, mesh in places) >= MANY:
+        yield APART
+    for own, points in seen.items():
+        if not len(points):
+            continue
+        reach = COPLANAR * (camera.project(points)[1] + np.abs(points).max(axis=1))
+        found = [name for name, mesh in places if name != own and lie_in(points, reach, mesh)]
+        for other in dict.fromkeys(found):
+            if not {_same_place(own, other), _same_place(other, own)} & set(findings.notes):
+                findings.note(_same_place(own, other))
+
+
+def _same_place(first: str, second: str) -> str:
+    return (
+        f"'{first}' and '{second}' have faces in the same place: which of them is seen is left to chance, in "
+        "Cycles and in the fit."
+    )
 
 
 def note_bent_normals(

@@ -18,8 +18,9 @@ Number = TypeVar("Number", np.int32, np.bool_)
 
 def read_mesh(evaluated: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> CornerMesh | None:
     """Return the triangles of an evaluated object in its own space, or None if it has no faces."""
-    # the data of an instance is what geometry nodes have made; in edit mode it is not complete
-    if isinstance(evaluated.data, bpy.types.Mesh) and evaluated.mode != "EDIT":
+    # the data of an instance is what geometry nodes have made; of a mesh that is edited it is not complete, also where
+    # another object edits it
+    if isinstance(evaluated.data, bpy.types.Mesh) and not evaluated.data.is_editmode:
         return _corner_mesh(evaluated.data) if len(evaluated.data.polygons) else None
     try:
         mesh = evaluated.to_mesh(preserve_all_data_layers=False, depsgraph=depsgraph)

@@ -28,7 +28,15 @@ from ..materials.baked_material import refuse_dark
 from ..materials.read_context import needs_bake, read_context
 from ..materials.read_material import name_material_settings, read_target
 from ..materials.unfinite_pixels import refuse_unfinite_pixels
-from ..meshes.face_notes import APART, MANY, MOST_BENT, MOST_BENT_OF_SMOOTH, note_bent_normals, note_coincident_faces
+from ..meshes.face_notes import (
+    APART,
+    MANY,
+    MOST_BENT,
+    MOST_BENT_OF_SMOOTH,
+    note_bent_normals,
+    note_coincident_faces,
+    note_coplanar_faces,
+)
 from ..meshes.known_meshes import KnownMeshes
 from ..meshes.mesh_arrays import CornerMesh, Piece, joined
 from ..meshes.read_mesh import MESH_TYPES, material_of_slot, read_mesh, slot_count
@@ -158,7 +166,8 @@ def _read(
             return None
         for number, each in enumerate(fitted):
             of_one = Findings()
-            check_visible(data, pieces[number], each.object, each.slot, scene, depsgraph, of_one)
+            seen = check_visible(data, pieces[number], each.object, each.slot, scene, depsgraph, of_one)
+            walk.seen[each.object.name] = np.concatenate([walk.seen.get(each.object.name, seen[:0]), seen])
             if of_one.errors:
                 data.unseen[number] = of_one.errors[0]
                 if not may_miss:
@@ -207,6 +216,7 @@ class _Walk:
         self.target_shadows: list[list[float | None]] = [[] for _ in targets]  # `shadow_transmission` of the instances
         self.bodies = 0
         self.places: list[tuple[str, TriangleMesh]] = []
+        self.seen: dict[str, NDArray[np.float64]] = {}  # points of each object that is fitted
         self.leaning_normals: dict[str, float] = {}  # the share of an object's normals that may turn away unnamed
         data.target_count = len(targets)
         self.bsdfs: dict[str, str] = {}
@@ -361,6 +371,7 @@ class _Walk:
     def note_faces(self) -> Steps[None]:
         """Report faces that lie in the same place, normals that turn away from the camera, and what is far away."""
         yield from note_coincident_faces(self.places, self.known, self.findings)
+        yield from note_coplanar_faces(self.seen, self.places, self.data.camera, self.findings)
         shapes = [self.data.target_of(number) for number in range(len(self.targets))]
         there = [(each, shape) for each, shape in zip(self.targets, shapes, strict=True) if shape is not None]
         own = {each.object.name: shape.mesh for each, shape in there}

@@ -19,6 +19,8 @@ from .scene_data import SceneData
 
 # rays towards as many points of the target are tried before it counts as hidden
 PROBES = 2000
+MET = 1e-4  # of a ray's length: it has met a point that it was aimed at; Blender's rays are single precision
+MOST_SEEN = 200  # points of the target, of those that a ray meets, are looked for
 OUTSIDE = "The camera does not see '{obj}': move it into the frame."
 
 
@@ -30,9 +32,13 @@ def check_visible(
     scene: bpy.types.Scene,
     depsgraph: bpy.types.Depsgraph,
     findings: Findings,
-) -> None:
-    """Report an error if none of the target's `pieces` lies in the frame, or everything in the frame is hidden."""
+) -> NDArray[np.float64]:
+    """Report an error if none of the target's `pieces` lies in the frame, or everything in the frame is hidden.
+
+    Returns points (n, 3) of the target that a ray from the camera meets before all else, at most `MOST_SEEN`.
+    """
     camera = data.camera
+    seen: list[NDArray[np.float64]] = []
     inside = np.concatenate(list(_points_inside(pieces, camera)))
     if not len(inside):
         every = np.concatenate([part.reshape(-1, 3) for piece in pieces for part in piece.corners()])
@@ -40,17 +46,23 @@ def check_visible(
         behind = (corner_depths < camera.clip_start).all() or (corner_depths > camera.clip_end).all()
         if behind or camera.beside(corners):
             findings.error(OUTSIDE.format(obj=target.name), *_whole_frame(camera))
-        return
-    seen = inside[np.linspace(0, len(inside) - 1, min(len(inside), PROBES)).astype(int)]
-    blocker = ""
-    for point in seen:
-        hit, face = _first_hit(point, data, scene, depsgraph)
-        if hit is None or (hit.original == target and _is_of_slot(hit, face, slot)):
-            return
-        blocker = hit.name
-        if _lets_light_through(hit):
-            return
-    findings.error(f"The camera does not see '{target.name}': it is hidden behind '{blocker}'.")
+        return np.empty((0, 3))
+    probed = inside[np.linspace(0, len(inside) - 1, min(len(inside), PROBES)).astype(int)]
+    probed = np.random.default_rng(0).permutation(probed)  # the first few are of all faces
+    is_seen, blocker = False, ""
+    for number, point in enumerate(probed):
+        hit, face, gap = _first_hit(point, data, scene, depsgraph)
+        if gap <= MET:
+            seen.append(point)
+        if hit is None or (hit.original == target and _is_of_slot(hit, face, slot)) or _lets_light_through(hit):
+            is_seen = True
+        else:
+            blocker = hit.name
+        if is_seen and (number >= MOST_SEEN or len(seen) == MOST_SEEN):
+            break
+    if not is_seen:
+        findings.error(f"The camera does not see '{target.name}': it is hidden behind '{blocker}'.")
+    return np.array(seen).reshape(-1, 3)
 
 
 def say_no_faces(fitted: FittedSlot, view_layer: bpy.types.ViewLayer, left_out: int, findings: Findings) -> None:
@@ -99,8 +111,11 @@ def _points_inside(pieces: Sequence[Piece], camera: Camera) -> Iterator[NDArray[
 
 def _first_hit(
     point: NDArray[np.float64], data: SceneData, scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph
-) -> tuple[bpy.types.Object | None, int]:
-    """What a ray from the camera towards a point meets first, and which face of it."""
+) -> tuple[bpy.types.Object | None, int, float]:
+    """What a ray from the camera towards a point meets first, which face of it, and how far from the point.
+
+    That is a share of the distance from where the ray begins.
+    """
     world = data.camera.world
     forward = -world[:3, 2]
     if data.camera.kind == "ORTHO":
@@ -108,8 +123,11 @@ def _first_hit(
     else:
         origin, direction = world[:3, 3], point - world[:3, 3]
     start = data.origin + origin + direction * (data.camera.clip_start / float(direction @ forward))
-    hit, _, _, face, item, _ = scene.ray_cast(depsgraph, Vector(start), Vector(direction))
-    return (item if hit else None), face
+    hit, place, _, face, item, _ = scene.ray_cast(depsgraph, Vector(start), Vector(direction))
+    if not hit:
+        return None, face, np.inf
+    there = data.origin + point
+    return item, face, float(np.linalg.norm(np.array(place) - there) / max(np.linalg.norm(there - start), 1e-30))
 
 
 def _lets_light_through(item: bpy.types.Object) -> bool:

@@ -129,6 +129,7 @@ SCENE = {
     "Object '{}' has {} triangles with corners at NaN, infinite or absurdly far positions; they are left out.": "Objekt '{}' hat {} Dreiecke mit Ecken an ungültigen, unendlichen oder absurd fernen Stellen; sie werden weggelassen.",
     "World '{}' takes light away (negative strength or colour): make it positive.": "Welt '{}' nimmt Licht weg (negative Stärke oder Farbe): sie positiv machen.",
     "Material '{}' takes light away (negative emission): make it positive.": "Material '{}' nimmt Licht weg (negative Emission): sie positiv machen.",
+    "The mesh of '{}' is in Edit Mode, where Cycles renders modifiers and shape keys as Edit Mode shows them: leave it before the fit, unless the reference was made in it.": "Das Mesh von '{}' ist im Bearbeitungsmodus, in dem Cycles Modifikatoren und Formschlüssel so rendert, wie dieser sie zeigt: ihn vor der Anpassung verlassen, falls die Referenz nicht darin entstanden ist.",
     "Object '{}' is in Sculpt Mode, where its modifiers are not as in a render: leave Sculpt Mode before the fit.": "Objekt '{}' ist im Skulpturmodus, in dem seine Modifikatoren nicht wie beim Rendern sind: vor der Anpassung den Skulpturmodus verlassen.",
     "Their light changes with the distance in another way at each place of the lamp.": "Ihr Licht ändert sich mit dem Abstand an jeder Stelle der Lampe auf andere Weise.",
     "Some instances of '{}' cast shadows and others do not; in the fit all are as the first of them.": "Einige Instanzen von '{}' werfen Schatten und andere nicht; in der Anpassung sind alle wie die erste.",

@@ -7,10 +7,11 @@ from typing import Any
 
 import bpy
 import numpy as np
+import pytest
 
 from blender_addon.export.files.ply_file import TriangleMesh
 from blender_addon.export.job import check_export
-from blender_addon.export.meshes.coincident import shared_faces
+from blender_addon.export.meshes.coincident import lie_in, shared_faces
 
 from ..scenes import add_camera, add_light, new_material
 
@@ -64,3 +65,41 @@ def test_an_object_with_faces_twice_is_named(scene: Any) -> None:
     assert not any("twice" in note for note in check_export(bpy.context, item)[1])
     item.modifiers.new("Mirror", "MIRROR").use_axis = (True, True, False)
     assert any("'Cube' has faces twice in the same place" in note for note in check_export(bpy.context, item)[1])
+
+
+def test_points_lie_in_a_face_where_they_are_inside_it_and_in_its_plane() -> None:
+    faces = mesh([FACE, FACE + np.array([5, 0, 1]), 0 * FACE])
+
+    def lies(*point: float, reach: float = 1e-6) -> bool:
+        return lie_in(np.array([point, (9.0, 9.0, 9.0)]), np.full(2, reach), faces)
+
+    assert lies(0.3, 0.3, 0.0)
+    assert lies(5.3, 0.3, 1.0)
+    assert not lies(0.6, 0.6, 0.0)  # in its bounds and plane
+    assert not lies(0.3, 0.3, 1e-4)
+    assert lies(0.3, 0.3, 1e-4, reach=2e-4)
+    turned = np.array([[0.2, -0.5, 0.7], [1.3, 0.4, -0.2], [0.1, 1.1, 0.9]])
+    weights = np.random.default_rng(3).dirichlet([1.0, 1.0, 1.0], 20)
+    assert all(lie_in(w[None] @ turned, np.array([1e-6]), mesh([turned])) for w in weights)
+    outside = weights + np.array([-1.01, 0.0, 1.01])
+    assert not any(lie_in(w[None] @ turned, np.array([1e-6]), mesh([turned])) for w in outside)
+
+
+@pytest.mark.parametrize(("gap", "is_named"), [(0.0, True), (1e-4, False)])
+def test_an_object_in_the_plane_of_the_target_is_named_where_it_is_seen(gap: float, is_named: bool, scene: Any) -> None:
+    """A text on a turned board; the board's foot stands on the floor, where nothing sees it."""
+    bpy.ops.mesh.primitive_cube_add(size=2.0, location=(0.0, 0.0, 1.0))
+    item = bpy.context.object
+    item.data.materials.append(new_material("Target"))
+    bpy.ops.mesh.primitive_plane_add(size=20.0)
+    bpy.ops.object.text_add(location=(-0.8, -1.0 - gap, 1.0), rotation=(np.pi / 2, 0, 0))
+    turn = bpy.data.objects.new("Turn", None)
+    scene.collection.objects.link(turn)
+    for each in list(scene.objects):
+        each.parent = turn if each != turn else None
+    turn.rotation_euler = (0.2, 0.1, 0.4)
+    add_light("POINT", (3, -3, 3), energy=300.0)
+    add_camera("PERSP", (2.0, -6.0, 2.0), rotation=(1.4, 0, 0.3))
+    bpy.context.view_layer.update()
+    said = [note for note in check_export(bpy.context, item)[1] if "in the same place" in note]
+    assert [note[:40] for note in said] == (["'Cube' and 'Text' have faces in the same"] if is_named else [])

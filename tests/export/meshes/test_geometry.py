@@ -169,7 +169,7 @@ def test_other_geometry_types(scene: Any, export: Any, mitsuba: Any) -> None:
     target = add_quad("Target", 1.0, 0.0, new_material("Target"))
     bpy.ops.curve.primitive_bezier_circle_add()
     bpy.context.object.data.bevel_depth = 0.1
-    bpy.ops.object.text_add()
+    bpy.ops.object.text_add(location=(0, 0, 0.5))
     bpy.ops.object.metaball_add(location=(5, 0, 0))
     bpy.ops.surface.primitive_nurbs_surface_sphere_add(location=(0, 5, 0))
     bpy.context.collection.objects.link(bpy.data.objects.new("Cloud", bpy.data.volumes.new("Cloud")))
@@ -215,6 +215,47 @@ def test_edit_mode_is_kept(scene: Any, export: Any, mitsuba: Any) -> None:
     assert target.mode == "EDIT"
     assert shapes_of(mitsuba, report)["target"].face_count() == 8
     bpy.ops.object.mode_set(mode="OBJECT")
+
+
+@pytest.mark.parametrize("by_other", [False, True])
+def test_a_mesh_that_is_edited_has_the_modifiers_of_edit_mode(
+    by_other: bool, scene: Any, export: Any, render_cycles: Any, render_mitsuba: Any
+) -> None:
+    """As in Cycles, also of an object that only shares its mesh with the edited one; what each does is the render's."""
+    world_color(scene, 0.0)
+    target = add_quad("Target", 0.1, 0.0, new_material("Target"))
+    target.location = (-1.3, 1.3, 0.0)
+    bpy.ops.mesh.primitive_cube_add(size=1.0, location=(0.7, 0.0, -2.0))
+    seen = bpy.context.object
+    seen.data.materials.append(emission_material("Seen", (1, 1, 1)))
+    seen.shape_key_add(name="Basis")
+    for point in seen.shape_key_add(name="Wide").data:
+        point.co.y *= 1.4
+    seen.data.shape_keys.key_blocks["Wide"].value, seen.active_shape_key_index = 1.0, 0
+    off, corners, rounded = (seen.modifiers.new("Corners", "SUBSURF") for _ in range(3))
+    off.levels, off.render_levels = 0, 2
+    corners.levels, corners.render_levels = 1, 2
+    rounded.show_in_editmode = False
+    mirror = seen.modifiers.new("Mirror", "MIRROR")
+    mirror.mirror_object = add_camera("ORTHO", (0, 0, 5), ortho_scale=3.0)
+    mirror.show_viewport = False
+    edited = seen
+    if by_other:
+        edited = bpy.data.objects.new("Edited", seen.data)
+        edited.location, edited.use_shape_key_edit_mode = (-9.0, 0.0, 0.0), True
+        scene.collection.objects.link(edited)
+    scene.cycles.samples = 64
+    shares = []
+    for mode, sentences in (("EDIT", 1), ("OBJECT", 0)):
+        bpy.context.view_layer.objects.active = edited
+        edited.select_set(True)
+        bpy.ops.object.mode_set(mode=mode)
+        report = export(target, name=mode)
+        assert sum("is in Edit Mode" in note for note in report.notes) == sentences
+        assert edited.mode == mode
+        shares.append(float(render_cycles().mean()))
+        assert float(render_mitsuba(report).mean()) == pytest.approx(shares[-1], abs=0.002)
+    assert abs(shares[1] - shares[0]) > 0.01
 
 
 def test_uv_orientation(scene: Any, export: Any, render_cycles: Any, render_mitsuba: Any) -> None:

@@ -88,6 +88,6 @@ def test_the_file_is_as_it_was_while_much_is_computed(
         assert division.levels == 0
         seen.append(pause.is_apart)
         assert pause.holds_scene == pause.is_apart
-    assert seen.count(True) == 10 + 1  # pieces, faces in the same place
+    assert seen.count(True) == 10 + 2  # pieces, faces in the same place, faces in the same plane
     sizes = [len(data) for name, data in meshes(tmp_path / "job").items() if name.startswith("target")]
     assert sizes[0] > 4 * min(map(len, meshes(tmp_path / "job").values()))
