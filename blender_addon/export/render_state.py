@@ -25,6 +25,7 @@ def render_state(view_layer: bpy.types.ViewLayer, scene: bpy.types.Scene) -> Ite
     """Give modifiers, curves and visibility their render settings, and put everything back on leaving."""
     changed: list[tuple[Any, str, Any]] = []
     hidden: list[bpy.types.Object] = []
+    view_layer.update()  # a script may have removed objects, which are None until then
     selected = [item for item in view_layer.objects if item.select_get(view_layer=view_layer)]
     active = view_layer.objects.active
     flushed = False

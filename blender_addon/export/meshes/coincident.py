@@ -37,25 +37,26 @@ def shared_faces(places: Sequence[tuple[str, TriangleMesh]]) -> list[tuple[str, 
     return list(dict.fromkeys((places[a][0], places[b][0]) for a, b in pairs))
 
 
-def lie_in(points: NDArray[np.float64], reach: NDArray[np.float64], mesh: TriangleMesh) -> bool:
-    """Whether any of some points (n, 3) lies in a triangle of a mesh, nearer than its reach (n,) to its plane."""
+def most_around(points: NDArray[np.float64], reach: NDArray[np.float64], mesh: TriangleMesh) -> int:
+    """In how many triangles of a mesh one of some points (n, 3) lies at most, nearer than its reach (n,) to them."""
     margin = reach.max()
     low, high = points.min(axis=0) - margin, points.max(axis=0) + margin
     if (mesh.positions.min(axis=0) > high).any() or (mesh.positions.max(axis=0) < low).any():
-        return False
+        return 0
     corners = mesh.positions[mesh.triangles]
     lowest, highest = corners.min(axis=1), corners.max(axis=1)
     near = np.flatnonzero((lowest <= high).all(axis=1) & (highest >= low).all(axis=1))
     corners, lowest, highest = corners[near].astype(np.float64), lowest[near], highest[near]
+    most = 0
     for point, own in zip(points, reach, strict=True):
         around = (lowest <= point + own).all(axis=1) & (highest >= point - own).all(axis=1)
-        if _hold(corners[around], point, own):
-            return True
-    return False
+        if around.any():
+            most = max(most, _count_around(corners[around], point, own))
+    return most
 
 
-def _hold(corners: NDArray[np.float64], point: NDArray[np.float64], reach: float) -> bool:
-    """Whether any of some triangles (n, 3, 3) holds a point."""
+def _count_around(corners: NDArray[np.float64], point: NDArray[np.float64], reach: float) -> int:
+    """How many of some triangles (n, 3, 3) hold a point."""
     first, second, third = (corners[:, k] for k in range(3))
     normal = np.cross(second - first, third - first)
     area = np.linalg.norm(normal, axis=1)
@@ -65,9 +66,8 @@ def _hold(corners: NDArray[np.float64], point: NDArray[np.float64], reach: float
         np.einsum("ij,ij->i", np.cross(b - a, point - a), normal)
         for a, b in ((first, second), (second, third), (third, first))
     ]
-    inside = np.min(sides, axis=0) > 0.0 if len(corners) else np.zeros(0, dtype=bool)
     apart = np.abs(np.einsum("ij,ij->i", point - first, normal))
-    return bool(np.any(inside & (apart <= reach)))
+    return int(np.count_nonzero((np.min(sides, axis=0) > 0.0) & (apart <= reach)))
 
 
 def _repeated(keys: NDArray[np.int64]) -> NDArray[np.int64]:

@@ -13,7 +13,7 @@ from ..files.ply_file import TriangleMesh
 from ..findings import Findings
 from ..steps import Pause, Steps
 from .bent_normals import share_of_bent_normals
-from .coincident import COPLANAR, lie_in
+from .coincident import COPLANAR, most_around
 from .known_meshes import KnownMeshes
 
 MANY = 100_000  # triangles that windows are drawn before: what is computed with them takes a tenth of a second
@@ -32,10 +32,7 @@ def note_coincident_faces(
         yield APART
     for first, second in known.shared_faces(places):
         if first == second:
-            findings.note(
-                f"'{first}' has faces twice in the same place, which shadow each other in Cycles and not in the fit: "
-                "merge them (Merge by Distance), or look for a modifier that copies them."
-            )
+            findings.note(_twice(first))
             continue
         findings.note(_same_place(first, second))
 
@@ -46,17 +43,26 @@ def note_coplanar_faces(
     camera: Camera,
     findings: Findings,
 ) -> Steps[None]:
-    """Report objects with faces in faces of an object that is fitted, of which `seen` has points (n, 3)."""
+    """Report faces in the plane of faces of an object that is fitted, of which `seen` has points (n, 3)."""
     if sum(len(mesh.triangles) for _, mesh in places) >= MANY:
         yield APART
     for own, points in seen.items():
         if not len(points):
             continue
         reach = COPLANAR * (camera.project(points)[1] + np.abs(points).max(axis=1))
-        found = [name for name, mesh in places if name != own and lie_in(points, reach, mesh)]
+        found = [name for name, mesh in places if most_around(points, reach, mesh) > (name == own)]
         for other in dict.fromkeys(found):
-            if not {_same_place(own, other), _same_place(other, own)} & set(findings.notes):
+            if other == own:
+                findings.note(_twice(own))
+            elif not {_same_place(own, other), _same_place(other, own)} & set(findings.notes):
                 findings.note(_same_place(own, other))
+
+
+def _twice(name: str) -> str:
+    return (
+        f"'{name}' has faces twice in the same place, which shadow each other in Cycles and not in the fit: merge them "
+        "(Merge by Distance), or look for a modifier that copies them."
+    )
 
 
 def _same_place(first: str, second: str) -> str:

@@ -11,9 +11,9 @@ import pytest
 
 from blender_addon.export.files.ply_file import TriangleMesh
 from blender_addon.export.job import check_export
-from blender_addon.export.meshes.coincident import lie_in, shared_faces
+from blender_addon.export.meshes.coincident import most_around, shared_faces
 
-from ..scenes import add_camera, add_light, new_material
+from ..scenes import add_camera, add_light, add_mesh, new_material
 
 
 def mesh(corners: Any) -> TriangleMesh:
@@ -67,22 +67,35 @@ def test_an_object_with_faces_twice_is_named(scene: Any) -> None:
     assert any("'Cube' has faces twice in the same place" in note for note in check_export(bpy.context, item)[1])
 
 
-def test_points_lie_in_a_face_where_they_are_inside_it_and_in_its_plane() -> None:
-    faces = mesh([FACE, FACE + np.array([5, 0, 1]), 0 * FACE])
+def test_points_lie_in_faces_where_they_are_inside_them_and_in_their_plane() -> None:
+    faces = mesh([FACE, FACE + np.array([5, 0, 1]), 0 * FACE, 2 * FACE - np.array([0.1, 0.1, 0])])
 
-    def lies(*point: float, reach: float = 1e-6) -> bool:
-        return lie_in(np.array([point, (9.0, 9.0, 9.0)]), np.full(2, reach), faces)
+    def count(*point: float, reach: float = 1e-6) -> int:
+        return most_around(np.array([point, (9.0, 9.0, 9.0)]), np.full(2, reach), faces)
 
-    assert lies(0.3, 0.3, 0.0)
-    assert lies(5.3, 0.3, 1.0)
-    assert not lies(0.6, 0.6, 0.0)  # in its bounds and plane
-    assert not lies(0.3, 0.3, 1e-4)
-    assert lies(0.3, 0.3, 1e-4, reach=2e-4)
+    assert count(0.3, 0.3, 0.0) == 2
+    assert count(5.3, 0.3, 1.0) == 1
+    assert count(0.6, 0.6, 0.0) == 1  # in the bounds and the plane of the other
+    assert count(1.1, 1.1, 0.0) == 0
+    assert count(0.3, 0.3, 1e-4) == 0
+    assert count(0.3, 0.3, 1e-4, reach=2e-4) == 2
     turned = np.array([[0.2, -0.5, 0.7], [1.3, 0.4, -0.2], [0.1, 1.1, 0.9]])
     weights = np.random.default_rng(3).dirichlet([1.0, 1.0, 1.0], 20)
-    assert all(lie_in(w[None] @ turned, np.array([1e-6]), mesh([turned])) for w in weights)
     outside = weights + np.array([-1.01, 0.0, 1.01])
-    assert not any(lie_in(w[None] @ turned, np.array([1e-6]), mesh([turned])) for w in outside)
+    for shares, wanted in ((weights, 1), (outside, 0)):
+        assert [most_around(w[None] @ turned, np.array([1e-6]), mesh([turned])) for w in shares] == [wanted] * 20
+
+
+def test_faces_of_the_target_in_a_larger_one_of_its_own_are_named(scene: Any) -> None:
+    corners = [(x, y, 0) for y in (-1, 0, 1) for x in (-1, 0, 1)]
+    squares = [(0, 1, 4, 3), (1, 2, 5, 4), (3, 4, 7, 6), (4, 5, 8, 7)]
+    target = add_mesh("Board", corners, squares, new_material("Target"))
+    add_light("POINT", (3, -3, 3), energy=300.0)
+    add_camera("ORTHO", (0, 0, 5), ortho_scale=3.0)
+    assert not any("in the same place" in note for note in check_export(bpy.context, target)[1])
+    larger = add_mesh("Larger", corners, [*squares, (0, 6, 8, 2)], new_material("Target"))
+    bpy.data.objects.remove(target)
+    assert any("'Larger' has faces twice in the same" in note for note in check_export(bpy.context, larger)[1])
 
 
 @pytest.mark.parametrize(("gap", "is_named"), [(0.0, True), (1e-4, False)])
