@@ -304,19 +304,18 @@ def mapping_matrix(node: bpy.types.Node) -> NDArray[np.float64]:
     """
     from mathutils import Euler  # pyright: ignore[reportMissingImports]
 
-    location, rotation, scale = (
-        np.array(read_socket(node.inputs[name]).value) if name in node.inputs and node.inputs[name].enabled else default
-        for name, default in (("Location", np.zeros(3)), ("Rotation", np.zeros(3)), ("Scale", np.ones(3)))
-    )
-    turn = np.array(Euler(rotation).to_matrix(), dtype=np.float64)
+    def value(name: str) -> NDArray[np.float64]:
+        return np.array(read_socket(node.inputs[name]).value)
+
+    turn, scale = np.array(Euler(value("Rotation")).to_matrix(), dtype=np.float64), value("Scale")
     matrix = np.eye(4)
     if node.vector_type in ("POINT", "VECTOR"):
         matrix[:3, :3] = turn @ np.diag(scale)
         if node.vector_type == "POINT":
-            matrix[:3, 3] = location
+            matrix[:3, 3] = value("Location")
     elif node.vector_type == "TEXTURE":
         matrix[:3, :3] = np.diag(np.divide(1.0, scale, out=np.zeros(3), where=scale != 0.0)) @ turn.T
-        matrix[:3, 3] = -matrix[:3, :3] @ location
+        matrix[:3, 3] = -matrix[:3, :3] @ value("Location")
     else:
         raise UnsupportedNodeError(f"the Mapping node '{node.name}' of type Normal")
     return matrix

@@ -11,6 +11,7 @@ import pytest
 
 bpy = pytest.importorskip("bpy")
 
+from blender_addon.process import saved_file  # noqa: E402
 from blender_addon.process.saved_file import save_copy, save_over  # noqa: E402
 
 SMALL = 30_000  # bytes a file may have; Blender's start-up scene has 90,000, and a third of it packed
@@ -68,3 +69,20 @@ def test_a_full_disk_takes_nothing_of_the_file_before(tmp_path: Path) -> None:
     assert "refused: No space left on device" in saved_with_little_space(path, "save_over")
     assert [each.name for each in tmp_path.iterdir()] == ["scene.blend"]
     assert path.read_bytes() == b"an hour of work"
+
+
+def test_a_file_is_whole_by_its_last_block_and_not_by_a_text_of_its_name(tmp_path: Path) -> None:
+    path, filepaths = tmp_path / "scene.blend", bpy.context.preferences.filepaths
+    before, filepaths.use_file_compression = filepaths.use_file_compression, False
+    bpy.context.scene["ENDB"] = "ENDB"
+    try:
+        save_copy(path)
+    finally:
+        filepaths.use_file_compression = before
+        del bpy.context.scene["ENDB"]
+    whole = path.read_bytes()
+    last = whole.rindex(b"ENDB")
+    assert whole[:last].count(b"ENDB") > 0
+    assert saved_file._is_whole(path)
+    path.write_bytes(whole[:last])
+    assert not saved_file._is_whole(path)

@@ -10,7 +10,9 @@ import numpy as np
 import pytest
 
 from mfo_backend.job.run import class_trials as module
+from mfo_backend.job.run import fit_scene
 from mfo_backend.job.run.material_classes import (
+    MOST_GLOW,
     PLAINER_GLOW,
     brightest_glow,
     changed,
@@ -23,6 +25,7 @@ from mfo_backend.job.run.material_classes import (
     with_values_of,
 )
 from mfo_backend.metrics.display.tone_mapping import DisplayView
+from mfo_backend.render.sheet.contact_sheet import ContactSheet
 from mfo_backend.types.certainty import Certainty, Level
 from mfo_backend.types.errors import NoNearerError, UnrecordableError
 from mfo_backend.types.image import Encoding, Image
@@ -241,3 +244,29 @@ def test_a_fit_that_was_stopped_is_not_called_worse():
     stopped = fitted(0.3)
     stopped = replace(stopped, result=replace(stopped.result, status=Status.CANCELLED, judgement=None))
     assert best_of({"of glass": stopped, "cut out": stopped}).notes == ()
+
+
+@pytest.mark.parametrize("several", [False, True])
+def test_a_glow_is_sought_below_what_the_first_picture_shows_of_the_target(several, monkeypatch):
+    """On a sheet of several pictures, too, and as the scene's exposure makes the picture of the light."""
+    of_target = np.array([[False, True, True]])
+    sheet = ContactSheet(((1, 3), (1, 3)), (1.0, 0.5), ("1", "2")) if several else None
+    counted = of_target if sheet is None else sheet.put([of_target, ~of_target])
+    nothing = np.zeros((*counted.shape, 3), np.float32)
+    asked = []
+    monkeypatch.setattr(fit_scene, "other_classes", lambda start, glow: asked.append(glow) or [])
+    monkeypatch.setattr(fit_scene, "with_other_classes", lambda fitted, *given: fitted)
+    found = SimpleNamespace(judgement=None, recovered={}, notes=())
+    fitted = module.Fitted(found, nothing, nothing, counted, sheet)
+    picture = np.array([[[9.0, 9.0, 9.0], [1.0, 2.0, 4.0], [3.0, 2.0, 6.0]]], np.float32)
+    job = SimpleNamespace(
+        request=SimpleNamespace(fit=SimpleNamespace(parameters="all"), film_exposure=2.0),
+        graphs=(),
+        load=lambda parameters, graphs: [SimpleNamespace(table=SimpleNamespace(names=()))],
+        fit=lambda renderers: fitted,
+        start=material(),
+        pictures=[SimpleNamespace(reference=Image(picture, Encoding.LINEAR), view=DisplayView())],
+        should_stop=lambda: True,
+    )
+    assert fit_scene._fit_and_other_classes(job) == (fitted, ())
+    assert asked == [MOST_GLOW * 5.0 / 2.0]
