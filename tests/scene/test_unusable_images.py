@@ -192,3 +192,18 @@ def test_a_folder_is_called_one(tmp_path):
         (tmp_path / name).mkdir()
         with pytest.raises(BadInputError, match=rf"{name}' is a folder: give one picture in it"):
             read_image(tmp_path / name)
+
+
+@pytest.mark.parametrize(
+    ("values", "kind"),
+    [
+        (np.array([[0.2, 0.7]], np.float32), "float32"),
+        (np.array([[3, 70_000]], np.int32), "int32"),
+        (np.array([[3, -1]], np.int32), "int32"),
+    ],
+)
+def test_grey_numbers_that_are_no_display_values_are_refused(tmp_path, values, kind):
+    """Each for a reason of its own: no whole numbers, more than 16 bits hold, less than black."""
+    PillowImage.fromarray(values).save(tmp_path / "grey.tif")
+    with pytest.raises(BadInputError, match=rf"'grey\.tif' holds {kind} values: PNG, JPEG and TIFF must hold 8 or 16"):
+        read_image(tmp_path / "grey.tif")
