@@ -5,7 +5,9 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 
-NEAR_EVALUATIONS = 12  # of a solve that begins near its end: where light is sampled, and of what is tried from there
+# Of a solve that begins near its end: where light is sampled, of what is tried from there, and of FLIP itself, whose
+# gradient takes about a tenth of a second at 256 x 256
+NEAR_EVALUATIONS = 12
 PERCEPTUAL_EVALUATIONS = 25  # of a stage, from each start
 # Squared: most rays of a pixel of one of several materials. With 256 half of the residual of a chest of 411 pixels was
 # the recording's own noise, which put a wrong material before the truth by a chi squared of 12; with 1024 the truth

@@ -23,7 +23,7 @@ from ..types.status import Status
 from .candidates import NOTHING_ELSE, Candidates
 from .judge.fit_task import FitTask, check_task
 from .judge.judged_result import judged_result
-from .judge.model_gap import model_gap
+from .judge.model_gap import with_gap
 from .judge.picture_errors import picture_errors
 from .judge.verification import VerifiedEnd, Verifier
 from .paper.fit import PaperRoute
@@ -249,8 +249,6 @@ def _judged(
         end = first if shown is first.image else end  # the gap below is that of what is shown
     halves = _halves(task, end)
     if halves is not None and not stopped:
-        gap = model_gap(task.reference, halves, task.mask, task.view)
-        said = (gap.sentence,) if gap is not None and gap.sentence else ()
-        result = replace(result, model_gap=gap, notes=(*result.notes, *said))
+        result = with_gap(result, task.reference, halves, task.mask, task.view)
     result = replace(result, seconds=time.monotonic() - task.began)  # a verdict takes time as well
     return FitOutcome(result, first.image, end.image, task.counted, halves)

@@ -49,7 +49,7 @@ class FitSettings:
         its losses can be compared.
     verify_spp
         Samples per pixel of the final pictures, which have a seed of their own; the presets other than `paper` take
-        fewer where more would say nothing (`fit.verified_end`).
+        fewer where more would say nothing (`fit.judge.verification`).
     max_iterations, patience
         Of each stage; `patience` is the ten of the paper's rules.
     learning_rate, schedule

@@ -101,6 +101,11 @@ class ParameterTable(Sequence[Parameter]):
         return np.concatenate([np.zeros(0), *(np.full(p.size, p.upper) for p in self._parameters)])
 
     @property
+    def width(self) -> Vector:
+        """How wide the range of each value is, shape (length,)."""
+        return self.upper - self.lower
+
+    @property
     def begin(self) -> NDArray[np.float64]:
         """Where a search from nothing begins, shape (length,)."""
         values = {p.name: 0.5 * (p.lower + p.upper) if p.begin is None else p.begin for p in self._parameters}
@@ -147,6 +152,22 @@ class ParameterTable(Sequence[Parameter]):
             part = vector[self._slices[p.name]]
             values[p.name] = float(part[0]) if p.size == 1 else tuple(float(v) for v in part)
         return values
+
+    def value(self, vector: Vector, name: str) -> float:
+        """The value `name` of a vector; of a colour its first channel."""
+        return float(vector[self._slices[name]][0])
+
+    def with_values(self, vector: Vector, **values: Value | Vector) -> Vector:
+        """A copy of a vector with these values; a name that is not here changes nothing."""
+        changed = vector.copy()
+        for name, value in values.items():
+            if name in self._slices:
+                changed[self._slices[name]] = value
+        return changed
+
+    def apart(self, first: Vector, second: Vector) -> float:
+        """How far two vectors differ in some value, as a part of its range."""
+        return float(np.max(np.abs(first - second) / self.width))
 
     def clip(self, vector: NDArray[np.float64]) -> NDArray[np.float64]:
         """The nearest vector inside the bounds."""

@@ -117,7 +117,7 @@ def test_the_start_is_kept_where_no_end_is_better(recover, sphere, truth, monkey
 def test_the_result_is_judged_by_pictures_that_count_as_no_pass(recover, sphere, truth, monkeypatch):
     monkeypatch.setattr(module, "RecordedRoute", finding([End("refine", truth)]))
     given, gap = [], ModelGap(0.2, 0.3)
-    monkeypatch.setattr(module, "model_gap", lambda *of: given.append(of) or gap)
+    monkeypatch.setattr("mfo_backend.fit.judge.model_gap.model_gap", lambda *of: given.append(of) or gap)
     outcome = recover()
     assert outcome.result.passes == sphere.passes == 2.0  # start and end; not the two halves
     assert len(sphere.calls) == len(set(sphere.calls)) + 1 == 4  # start and end see the same numbers, each half its own
@@ -151,7 +151,7 @@ def test_the_gap_is_that_of_the_start_where_the_end_is_dropped(recover, sphere, 
     far = End("refine", np.array([0.01, 0.9, 0.9, 1.0, 0.0]))
     monkeypatch.setattr(module, "RecordedRoute", finding([far], choose=lambda images: Choice(0, True)))
     given = []
-    monkeypatch.setattr(module, "model_gap", lambda *of: given.append(of))
+    monkeypatch.setattr("mfo_backend.fit.judge.model_gap.model_gap", lambda *of: given.append(of))
     outcome = recover()
     assert outcome.result.recovered == outcome.result.initial
     assert START_KEPT in outcome.result.message

@@ -18,17 +18,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...material.principled.blender_selection import AMOUNT_OF
-from ...types.parameter import ParameterTable
+from ...types.parameter import ParameterTable, Vector
 from ..squares.problem import Problem, Rival
 from ..squares.recording_noise import MOST_OWN, rows_of_samples
-from ..tolerances import LOUDEST
+from ..tolerances import LOUDEST, TELLING
 from .unneeded_lobes import is_off
-
-Vector = NDArray[np.float64]
 
 # Of a sentence on another material
 TOLD_FROM = 0.05  # its probability; rarer ones still widen the deviations
-SEEN_CHANGE = 0.05  # of a value's range
 MOST_TOLD = 4  # values in its sentence; no measurement
 
 
@@ -87,10 +84,10 @@ def rival_notes(rivals: Sequence[Rival], x: NDArray[np.float64], table: Paramete
     """A sentence for each likely rival of `x`, likeliest first, with the values that differ most."""
     notes = []
     for rival in sorted(rivals, key=lambda rival: -rival.share):
-        away = np.abs(rival.x - x) / (table.upper - table.lower)
+        away = np.abs(rival.x - x) / table.width
         names = [name for name in table.names if _matters(name, x, rival.x, table)]
         change = {name: float(away[table.slice_of(name)].max()) for name in names}
-        told = [name for name in sorted(change, key=lambda n: -change[n]) if change[name] > SEEN_CHANGE][:MOST_TOLD]
+        told = [name for name in sorted(change, key=lambda n: -change[n]) if change[name] > TELLING][:MOST_TOLD]
         if rival.share < TOLD_FROM or not told:
             continue
         instead = ", ".join(

@@ -18,17 +18,15 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ...solve.bounded_least_squares import Solution
-from ...types.parameter import ParameterTable
+from ...types.parameter import ParameterTable, Vector
 from ..search.global_start import OPPOSITE
 from ..squares.problem import Problem, Rival
-from ..tolerances import ANOTHER_MATERIAL, CLEARLY_LOWER, HOPELESS, MODEL_ERROR, OFF
+from ..tolerances import ANOTHER_MATERIAL, BOX_SD, CLEARLY_LOWER, HOPELESS, MODEL_ERROR, OFF
 from .compare import compare
 from .simplest import exchangeable, exchanged
 
-Vector = NDArray[np.float64]
 # of a start, given up where it promises no less than this cost
 SolveBelow = Callable[[Vector, float], Solution]
 
@@ -37,7 +35,6 @@ MOST_MOVES = 3  # from basin to basin
 SHEENS = (0.1, 0.5)  # roughnesses of a sheen to begin with
 STRETCH = 0.9  # of Blender's anisotropy: the stretch is the root of 1 less so much of it
 PAST = 1.02  # the larger width that says whether the picture knows of the clamp
-SHARE = 1.0 / 3.0  # mean square of what is as likely anywhere on a line from 0 to 1
 F0_OF_LEVEL = 0.08  # of a specular level of 1 (Burley 2012; Blender's at an index of 1.5)
 DARK_ALBEDO, DARK_F0 = 0.05, 0.1  # black plastic and grey metal look alike below
 
@@ -57,23 +54,23 @@ def _better(solve: SolveBelow, found: Solution, table: ParameterTable) -> Soluti
     if known <= SOLVED:
         return None
     limit = CLEARLY_LOWER * known
-    solutions = (solve(np.clip(start, table.lower, table.upper), limit) for start in moved(found.x, table))
+    solutions = (solve(table.clip(start), limit) for start in moved(found.x, table))
     return next((other for other in solutions if other.equations.cost < limit), None)
 
 
 def moved(x: Vector, table: ParameterTable) -> Iterator[Vector]:
     """Materials that may be taken for `x`, in the order in which they are worth a trial."""
-    if {"flatness", "metallic"} <= set(table.names) and _value(x, table, "flatness") > OFF:
-        yield _with(x, table, flatness=0.0, metallic=0.5, specular=0.5)
+    if {"flatness", "metallic"} <= set(table.names) and table.value(x, "flatness") > OFF:
+        yield table.with_values(x, flatness=0.0, metallic=0.5, specular=0.5)
     if not exchangeable(table):
         return
     yield exchanged(x, table)
-    yield _with(x, table, roughness=0.5 * _value(x, table, "roughness"))
-    yield _with(x, table, coat_roughness=0.5)
-    yield _with(x, table, coat_weight=0.5)
+    yield table.with_values(x, roughness=0.5 * table.value(x, "roughness"))
+    yield table.with_values(x, coat_roughness=0.5)
+    yield table.with_values(x, coat_weight=0.5)
     if "sheen_weight" in table.names:
         for roughness in SHEENS:
-            yield _with(x, table, sheen_weight=0.5, sheen_roughness=roughness)
+            yield table.with_values(x, sheen_weight=0.5, sheen_roughness=roughness)
 
 
 def taken_for(x: Vector, table: ParameterTable) -> tuple[Vector, ...]:
@@ -81,8 +78,8 @@ def taken_for(x: Vector, table: ParameterTable) -> tuple[Vector, ...]:
     others = list(moved(x, table))
     if "metallic" in table.names:
         dielectric, metal = OPPOSITE
-        others.insert(0, _with(x, table, metallic=metal if _value(x, table, "metallic") < 0.5 else dielectric))
-    return tuple(np.clip(other, table.lower, table.upper) for other in others)
+        others.insert(0, table.with_values(x, metallic=metal if table.value(x, "metallic") < 0.5 else dielectric))
+    return tuple(table.clip(other) for other in others)
 
 
 def metal_rivals(
@@ -98,9 +95,8 @@ def metal_rivals(
         return found, ()
     cost = found.equations.cost
     most = _out_of_reach(problem, cost)
-    other = solve(np.clip(start, table.lower, table.upper), most)
-    away = np.max(np.abs(other.x - found.x) / (table.upper - table.lower))
-    if other.equations.cost > most or away < ANOTHER_MATERIAL:
+    other = solve(table.clip(start), most)
+    if other.equations.cost > most or table.apart(other.x, found.x) < ANOTHER_MATERIAL:
         return found, ()
     if other.equations.cost < cost:
         found, other = other, found
@@ -118,26 +114,14 @@ def metal_exchanged(x: Vector, table: ParameterTable) -> Vector | None:
     level = next((name for name in ("specular", "specular_ior_level") if name in table.names), None)
     if level is None or not {"base_color", "metallic"} <= set(table.names):
         return None
-    color, metallic = x[table.slice_of("base_color")], _value(x, table, "metallic")
-    f0 = (1.0 - metallic) * F0_OF_LEVEL * _value(x, table, level) + metallic * color
+    color, metallic = x[table.slice_of("base_color")], table.value(x, "metallic")
+    f0 = (1.0 - metallic) * F0_OF_LEVEL * table.value(x, level) + metallic * color
     if np.max((1.0 - metallic) * color) > DARK_ALBEDO or np.max(f0) > DARK_F0:
         return None
     dielectric, metal = OPPOSITE
     if metallic < 0.5:
-        return _with(x, table, metallic=metal, base_color=f0)
-    return _with(x, table, metallic=dielectric, base_color=0.0, **{level: float(f0.mean()) / F0_OF_LEVEL})
-
-
-def _value(x: Vector, table: ParameterTable, name: str) -> float:
-    return float(x[table.slice_of(name)][0])
-
-
-def _with(x: Vector, table: ParameterTable, **values: float | Vector) -> Vector:
-    y = x.copy()
-    for name, value in values.items():
-        if name in table.names:
-            y[table.slice_of(name)] = value
-    return y
+        return table.with_values(x, metallic=metal, base_color=f0)
+    return table.with_values(x, metallic=dielectric, base_color=0.0, **{level: float(f0.mean()) / F0_OF_LEVEL})
 
 
 def width_rivals(problem: Problem, x: Vector, table: ParameterTable) -> tuple[Rival, ...]:
@@ -151,7 +135,7 @@ def width_rivals(problem: Problem, x: Vector, table: ParameterTable) -> tuple[Ri
     def alike(stretch: float) -> Vector:
         y = x.copy()
         y[roughness], y[anisotropic] = np.sqrt(narrow / stretch), (1.0 - stretch**2) / STRETCH
-        return np.clip(y, table.lower, table.upper)
+        return table.clip(y)
 
     past = float(np.sqrt(narrow / PAST))
     if past <= least:
@@ -159,7 +143,7 @@ def width_rivals(problem: Problem, x: Vector, table: ParameterTable) -> tuple[Ri
     cost = problem.equations(x).cost
     if problem.equations(alike(past)).cost > _out_of_reach(problem, cost):
         return ()
-    return (Rival(alike(least), SHARE, last=True),)
+    return (Rival(alike(least), BOX_SD**2, last=True),)
 
 
 def _stretch(anisotropic: float) -> float:

@@ -12,18 +12,15 @@ from dataclasses import dataclass, replace
 from typing import Protocol
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ...material.principled.blender_selection import AMOUNT_OF
 from ...solve.bounded_least_squares import Solution
-from ...types.parameter import ParameterTable
+from ...types.parameter import ParameterTable, Vector
 from ..plans import NEAR_EVALUATIONS
 from ..squares.problem import Problem, Refined, Rival
 from ..tolerances import ANOTHER_MATERIAL, HOPELESS, SIGNIFICANT
 from .compare import compare
 from .unneeded_lobes import Box, box_holding, is_off, is_plain, values_off
-
-Vector = NDArray[np.float64]
 
 BASE, COAT = ("specular_ior_level", "roughness"), ("coat_weight", "coat_roughness")
 SAME_F0 = 2.0  # Specular IOR Level 0.5 reflects what a coat of weight 1 and the same index does (Blender 4.0)
@@ -68,14 +65,13 @@ class OtherEnds:
             return found
         box = box_holding(table, self._user, found.off)
         end = self._attempt(found.end, np.clip(exchanged(x, table), *box), box)
-        width = table.upper - table.lower
-        if end is None or np.max(np.abs(end.x - x) / width) < ANOTHER_MATERIAL:
+        if end is None or table.apart(end.x, x) < ANOTHER_MATERIAL:
             return found
         if is_off(COAT[0], end.x, table) and COAT[0] in values_off(table, self._user):
             return found  # which is simpler: `_without_lobes` comes there, too
         it = compare(self._all, x, end.x)
-        nearer = np.linalg.norm((end.x - self._user) / width) < np.linalg.norm((x - self._user) / width)
-        if it.more / it.inflation < -SIGNIFICANT or (nearer and it.more < SIGNIFICANT):
+        away, was = (np.linalg.norm((at - self._user) / table.width) for at in (end.x, x))
+        if it.more / it.inflation < -SIGNIFICANT or (away < was and it.more < SIGNIFICANT):
             return replace(found, end=end, rivals=(*found.rivals, Rival(x, 1.0 - it.better)))
         return replace(found, rivals=(*found.rivals, Rival(end.x, it.better)))
 
@@ -144,25 +140,20 @@ class OtherEnds:
 
 def exchanged(x: Vector, table: ParameterTable) -> Vector:
     """The material whose base has the coat's highlight and whose coat has the base's."""
-    level, roughness, weight, coat_roughness = (float(x[table.slice_of(name)][0]) for name in (*BASE, *COAT))
+    level, roughness, weight, coat_roughness = (table.value(x, name) for name in (*BASE, *COAT))
     return _with(x, table, weight / SAME_F0, coat_roughness, level * SAME_F0, roughness)
 
 
 def coat_to_base(x: Vector, table: ParameterTable) -> Vector:
     """The material without a coat whose base has the coat's highlight, as bright as both."""
-    level, _, weight, coat_roughness = (float(x[table.slice_of(name)][0]) for name in (*BASE, *COAT))
+    level, _, weight, coat_roughness = (table.value(x, name) for name in (*BASE, *COAT))
     return _with(x, table, level + weight / SAME_F0, coat_roughness, 0.0, coat_roughness)
 
 
 def _with(x: Vector, table: ParameterTable, *values: float) -> Vector:
     """`x` with these values of base and coat, and their highlights without a tint."""
-    y = x.copy()
-    for name, value in zip((*BASE, *COAT), values, strict=True):
-        y[table.slice_of(name)] = value
-    for name in ("specular_tint", "coat_tint"):
-        if name in table.names:
-            y[table.slice_of(name)] = 1.0
-    return np.clip(y, table.lower, table.upper)
+    highlights = dict(zip((*BASE, *COAT), values, strict=True))
+    return table.clip(table.with_values(x, **highlights, specular_tint=1.0, coat_tint=1.0))
 
 
 def exchangeable(table: ParameterTable) -> bool:

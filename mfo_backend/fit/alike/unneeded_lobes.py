@@ -6,14 +6,12 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ...material.principled.blender_selection import AMOUNT_OF
 from ...solve.bounded_least_squares import NormalEquations, Solution, step_in_box
-from ...types.parameter import ParameterTable
+from ...types.parameter import ParameterTable, Vector
 from ..tolerances import OFF, SIGNIFICANT
 
-Vector = NDArray[np.float64]
 Box = tuple[Vector, Vector]
 
 
@@ -81,13 +79,13 @@ def is_plain(name: str, x: Vector, table: ParameterTable) -> bool:
     if not name.endswith("_tint"):
         return is_off(name, x, table)
     part = table.slice_of(name)
-    return bool(np.all((table.upper - x)[part] <= OFF * (table.upper - table.lower)[part]))
+    return bool(np.all((table.upper - x)[part] <= OFF * table.width[part]))
 
 
 def is_off(name: str, x: Vector, table: ParameterTable) -> bool:
     """Whether a value in `x` is so near its lower bound that it counts as none."""
     part = table.slice_of(name)
-    return bool(np.all((x - table.lower)[part] <= OFF * (table.upper - table.lower)[part]))
+    return bool(np.all((x - table.lower)[part] <= OFF * table.width[part]))
 
 
 def with_user_details(x: Vector, user: Vector, table: ParameterTable) -> Vector:

@@ -17,23 +17,16 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ...solve.leverage import residuals_left_out
 from ...types.certainty import Certainty, Level
-from ...types.parameter import ParameterTable
+from ...types.parameter import ParameterTable, Vector
 from ..squares.problem import Rival
 from ..squares.recording_noise import without_own_noise
-from ..tolerances import DETERMINED_BELOW, MODEL_ERROR, WEAK_BELOW
-
-Vector = NDArray[np.float64]
+from ..tolerances import BOX_SD, DETERMINED_BELOW, MODEL_ERROR, WEAK_BELOW
 
 INFLATION = 1.2  # where own noise in the derivatives is not known
 TOGETHER, MOST_TOGETHER = 0.5, 2  # correlation from which on two values move together; so many are named
-# Of the box: the root mean square distance of a uniform distribution over it from one of its ends, which is the largest
-# from any point. In 30 fits of Cycles' pictures 73 of 220 known values are called determined with it and 67 without,
-# one of them wrongly in both (docs/notebook/several_pictures.md). Smaller: more is promised of what values trade.
-BOX_SD = 3.0**-0.5
 # Of the box: keeps directions without any effect finite until the box is asked. Of 40 random problems, half with own
 # noise, no deviation changes by more than 0.6 % from here on. Smaller: it counts beside the box. Larger: an inverse of
 # what no pixel shows loses its digits.
@@ -71,7 +64,7 @@ def covariance(
     stands for an error of all values together.
     """
     k = rows.shape[2] - 1
-    width = table.upper - table.lower
+    width = table.width
     known, residual, inflation = rows[:, :, 1:] * width, rows[:, :, 0], INFLATION
     noise = np.copysign(np.maximum(np.abs(residual), model_error), residual)
     told = np.zeros((0, *known.shape[1:])) if further is None else further.derivatives * width
@@ -131,7 +124,7 @@ def with_rivals(spread: Vector, x: Vector, rivals: Sequence[Rival], width: Vecto
 
 def standard_deviations(spread: Vector, table: ParameterTable) -> Vector:
     """Standard deviation (k,) of each value, in its own unit, from a `covariance`."""
-    return (table.upper - table.lower) * np.sqrt(np.maximum(np.diag(spread), 0.0))
+    return table.width * np.sqrt(np.maximum(np.diag(spread), 0.0))
 
 
 def certainties(sd: Vector, table: ParameterTable, spread: Vector | None = None) -> dict[str, Certainty]:

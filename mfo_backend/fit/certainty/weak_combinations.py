@@ -6,14 +6,12 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ...types.certainty import Certainty, Level, WeakCombination
-from ...types.parameter import ParameterTable
+from ...types.parameter import ParameterTable, Vector
+from ..result.outcome import listed
+from ..tolerances import TELLING
 
-Vector = NDArray[np.float64]
-
-WEAK_DIRECTION = 0.05  # standard deviation along it, in widths of the box, from which it is named
 PART = 0.35  # of the largest one: smaller components of a direction are not named
 ALONE = 0.9  # share of one value in a direction that makes it that value's own uncertainty, which has its own column
 MOST_DIRECTIONS = 3  # named; no measurement
@@ -36,11 +34,11 @@ def weak_combinations(
     precision = np.linalg.inv(spread + LEAST_VARIANCE * np.eye(len(spread)))[np.ix_(entries, entries)]
     variances, directions = np.linalg.eigh(np.linalg.inv(precision))
     owner = [name for name in names for _ in range(table[name].size)]
-    width = (table.upper - table.lower)[entries]
+    width = table.width[entries]
     found = []
     for variance, direction in list(zip(variances, directions.T, strict=True))[::-1]:
         deviation = float(np.sqrt(max(variance, 0.0)))
-        if deviation < WEAK_DIRECTION or len(found) == MOST_DIRECTIONS:
+        if deviation < TELLING or len(found) == MOST_DIRECTIONS:
             break
         share = {name: sum(direction[i] ** 2 for i, o in enumerate(owner) if o == name) for name in names}
         largest = max(share.values())
@@ -65,12 +63,8 @@ def _sentence(step: dict[str, float], table: ParameterTable) -> str:
         f"{abs(v):.2g} {'more' if v > 0.0 else 'less'} {word}" for word, v in zip(words, step.values(), strict=True)
     ]
     helps = "a grazing view or another light" if any(name.startswith(_GRAZING) for name in step) else "another light"
-    all_of_them = _and(words)
+    all_of_them = listed(words)
     return (
-        f"{all_of_them[:1].upper()}{all_of_them[1:]} can be traded against each other: {_and(moves)} would hardly "
+        f"{all_of_them[:1].upper()}{all_of_them[1:]} can be traded against each other: {listed(moves)} would hardly "
         f"change the picture; {helps} would tell them apart."
     )
-
-
-def _and(words: Sequence[str]) -> str:
-    return words[0] if len(words) == 1 else f"{', '.join(words[:-1])} and {words[-1]}"

@@ -19,6 +19,7 @@ from ...metrics.flip.flip_filters import DEFAULT_PIXELS_PER_DEGREE, flip_reach
 from ...metrics.flip.ldr_flip import flip_map
 from ...metrics.pixels.neighbours import sums_around
 from ...types.verdict import Difference
+from ..tolerances import CHANCE
 from .region import blocks_around
 
 # Pixels between two whose differences are multiplied. Those next to each other may share some of their noise: by
@@ -47,9 +48,6 @@ FILTERED = 0.6
 MOST_APART = 0.5
 LEAST_STEP = 1e-3  # of light: over which the slope of a display is taken. No measurement
 DRAWS = 4  # whose mean is the noise of few pixels; of one, FLIP scattered by 0.005
-# Standard deviations that are chance: they are taken from what neighbours share, a slope may be so much larger in
-# truth, and a square that is not above so many of its own may be none. No measurement
-CHANCE = 2.0
 
 Light = NDArray[np.floating]
 Mask = NDArray[np.bool_]
@@ -67,19 +65,19 @@ def beyond_noise(
     near = blocks_around(mask, 1, flip_reach(DEFAULT_PIXELS_PER_DEGREE))  # all that counts, and what FLIP sees of it
     reference, result, mask = reference[near], result[near], mask[near]
     calm_reference, calm = (_blurred(light, mask) for light in (reference, result))
-    shown = [_display(light) for light in (calm_reference, calm)]
-    seen = _mean_flip(shown[0], shown[1], mask)
+    shown = [displayed(light) for light in (calm_reference, calm)]
+    seen = mean_flip(shown[0], shown[1], mask)
     apart = np.where(mask[..., None], reference - result, 0.0).astype(np.float64)
     variance = _noise_variance(apart, mask, lags)
     drawn = _of_few(apart, variance, mask, lags) if np.count_nonzero(mask) < FEW_PIXELS else _normal(apart, variance)
-    noisy = [_display(np.maximum(calm + _blurred(noise, mask), 0.0)) for noise in drawn]
+    noisy = [displayed(np.maximum(calm + _blurred(noise, mask), 0.0)) for noise in drawn]
     light = np.clip(apart * _slope(calm_reference, calm), -MOST_APART, MOST_APART)
-    displayed = np.where(mask[..., None], _display(reference) - _display(result), 0.0).astype(np.float64)
-    shared, at_least = _beyond_chance(light, displayed, mask, lags)
-    fine = max(_beyond_chance(light, displayed, mask, of, either=True)[1] for of in FINE)
+    seen_light = np.where(mask[..., None], displayed(reference) - displayed(result), 0.0).astype(np.float64)
+    shared, at_least = _beyond_chance(light, seen_light, mask, lags)
+    fine = max(_beyond_chance(light, seen_light, mask, of, either=True)[1] for of in FINE)
     return Difference(
         seen,
-        float(np.mean([_mean_flip(shown[1], picture, mask) for picture in noisy])),
+        float(np.mean([mean_flip(shown[1], picture, mask) for picture in noisy])),
         shared,
         at_least,
         fine,
@@ -111,7 +109,7 @@ def _slope(first: Light, second: Light) -> NDArray[np.float64]:
     """
     low, step = np.minimum(first, second), np.maximum(np.abs(first - second), LEAST_STEP)
     high = np.add(low, step, dtype=np.float64)
-    return (_display(high).astype(np.float64) - _display(low)) / step
+    return (displayed(high).astype(np.float64) - displayed(low)) / step
 
 
 def _normal(apart: Light, variance: NDArray[np.float64]) -> Iterator[Light]:
@@ -184,9 +182,11 @@ def _blurred(light: Light, mask: Mask) -> NDArray[np.float64]:
     return np.where(mask[..., None], mean / np.maximum(weight, 1e-6), 0.0)
 
 
-def _display(light: Light) -> NDArray[np.float32]:
+def displayed(light: Light) -> NDArray[np.float32]:
+    """What a display shows of linear light, 1 being its white."""
     return srgb_from_linear(np.clip(light, 0.0, 1.0).astype(np.float32))
 
 
-def _mean_flip(first: NDArray[np.float32], second: NDArray[np.float32], mask: Mask) -> float:
+def mean_flip(first: NDArray[np.float32], second: NDArray[np.float32], mask: Mask) -> float:
+    """Mean FLIP over a mask of two pictures in display values."""
     return float(flip_map(first, second)[mask].mean(dtype=np.float64))

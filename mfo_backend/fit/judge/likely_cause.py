@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from ...render.camera.widened_mask import widened
 from ...types.verdict import Cause
-from .beyond_noise import CHANCE
+from ..tolerances import CHANCE
 
 MOST_SHIFT = 5  # pixels that a picture is tried to be moved by, along each axis
 # Part of the squared difference that a moved picture takes away, from which on its place is the reason

@@ -7,13 +7,12 @@ from collections.abc import Callable
 from contextlib import suppress
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ...types.image import Pixels
+from ...types.parameter import Vector
+from ..plans import NEAR_EVALUATIONS
 from .picture_judge import PictureJudge
 
-Vector = NDArray[np.float64]
-FLIP_EVALUATIONS = 12  # a gradient of HDR-FLIP at 256 x 256 takes about a tenth of a second
 GAIN = 1e-3  # relative to the error at the start; less cannot be seen
 SKIP_BELOW = 1e-4  # a mean FLIP that leaves nothing to gain
 
@@ -46,7 +45,7 @@ def minimise_flip(
 
     def at(scaled: Vector) -> tuple[float, Vector]:
         nonlocal best, best_value, count
-        if count >= FLIP_EVALUATIONS or should_stop():
+        if count >= NEAR_EVALUATIONS or should_stop():
             raise _Enough
         count += 1
         x = np.clip(lower + scaled * width, lower, upper)
@@ -68,6 +67,6 @@ def minimise_flip(
     bounds = list(zip(np.zeros_like(width), (upper - lower) / width, strict=True))
     with suppress(_Enough):
         minimize(
-            at, first, jac=True, method="SLSQP", bounds=bounds, options={"ftol": GAIN, "maxiter": FLIP_EVALUATIONS}
+            at, first, jac=True, method="SLSQP", bounds=bounds, options={"ftol": GAIN, "maxiter": NEAR_EVALUATIONS}
         )
     return best, best_value

@@ -3,6 +3,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -12,8 +14,8 @@ from ...metrics.flip.block_means import block_sums
 from ...metrics.pixels.neighbours import sums_around
 from ...types.image import Encoding, Image, Pixels
 from ...types.model_gap import ModelGap
-from ..tolerances import DIM_FLOOR
-from .beyond_noise import CHANCE
+from ...types.result import FitResult
+from ..tolerances import CHANCE, DIM_FLOOR
 from .region import blocks_around
 
 GAP_BLOCK = 4  # pixels along each side of what is compared
@@ -53,6 +55,15 @@ def model_gap(reference: Image, renders: tuple[Pixels, Pixels], mask: NDArray[np
     square, sd = float(squares.mean()), float(squares.std()) / squares.size**0.5
     found = max(square, 0.0) ** 0.5 if square > CHANCE * sd else 0.0
     return ModelGap(found, max(square + CONFIDENCE * sd, 0.0) ** 0.5)
+
+
+def with_gap(
+    result: FitResult, reference: Image, renders: tuple[Pixels, Pixels], mask: NDArray[np.bool_], view: View
+) -> FitResult:
+    """The result with its `model_gap`, and the sentence on it among its notes."""
+    gap = model_gap(reference, renders, mask, view)
+    said = (gap.sentence,) if gap is not None and gap.sentence else ()
+    return replace(result, model_gap=gap, notes=(*result.notes, *said))
 
 
 def _around(level: NDArray[np.float64], full: NDArray[np.bool_]) -> NDArray[np.float64]:

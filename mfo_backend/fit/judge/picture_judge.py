@@ -20,7 +20,7 @@ class PictureJudge:
     """The loss `name`, such as ``flip-hdr``, of linear pictures against a reference.
 
     Where many pixels count, pictures are compared at a fraction of their size, as their errors are
-    (`fit.picture_errors`). With `blurred`, picture and reference are blurred inside the mask first: the FLIP of
+    (`fit.judge.picture_errors`). With `blurred`, picture and reference are blurred inside the mask first: the FLIP of
     independent noise is a large number that says nothing of the material, and being no square it shifts the best
     values, too.
     """

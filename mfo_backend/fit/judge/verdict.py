@@ -9,15 +9,14 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from ...metrics.display.colour import linear_from_srgb, srgb_from_linear
+from ...metrics.display.colour import linear_from_srgb
 from ...metrics.display.tone_mapping import DisplayView, View
 from ...metrics.flip.block_means import block_side, block_sums
-from ...metrics.flip.ldr_flip import flip_map
 from ...render.camera.widened_mask import widened
 from ...types.image import Encoding, Image, Pixels
 from ...types.result import PictureResult
 from ...types.verdict import Difference, Judgement, Verdict, worst
-from .beyond_noise import FEW_PIXELS, NEXT, beyond_noise
+from .beyond_noise import FEW_PIXELS, NEXT, beyond_noise, displayed, mean_flip
 from .likely_cause import likely_cause
 
 # Measured on Cycles scenes by `studies.verdicts` (docs/user/verdicts.md): with nothing planted at most 0.019, 0.005 and
@@ -64,11 +63,13 @@ def judge(
     verdict = _verdict(difference)
     if verdict is Verdict.SAME and differs:
         verdict = Verdict.CLOSE
+    shown, result_shown = map(displayed, target)
     if verdict is Verdict.SAME:
         few = np.count_nonzero(inside) < FEW_PIXELS
-        return Judgement(verdict, None, difference, around, may_hide=few and _mean_flip(*target, inside) > HIDDEN)
-    first, second = (_display(light) for light in surroundings)
-    shown, result_shown = (_display(light) for light in target)
+        # pixel by pixel, noise included: no difference of the pictures is larger
+        hides = few and mean_flip(shown, result_shown, inside) > HIDDEN
+        return Judgement(verdict, None, difference, around, may_hide=hides)
+    first, second = map(displayed, surroundings)
     cause = likely_cause(shown, result_shown, inside, (first, second, outside) if differs else None, noted=noted)
     return Judgement(verdict, cause, difference, around)
 
@@ -101,11 +102,6 @@ def _inside(mask: Mask, side: int) -> Mask:
     return block_sums(mask[..., None].astype(np.float64), side)[..., 0] > 0.5 * side**2
 
 
-def _mean_flip(first: NDArray[np.float64], second: NDArray[np.float64], mask: Mask) -> float:
-    """FLIP pixel by pixel, noise included: no difference of the pictures is larger."""
-    return float(flip_map(_display(first), _display(second))[mask].mean(dtype=np.float64))
-
-
 def _verdict(difference: Difference) -> Verdict:
     visible, shared = difference.visible, difference.shared_at_least
     if visible <= SAME_VISIBLE and shared <= SAME_SHARED and difference.fine_at_least <= SAME_FINE:
@@ -129,10 +125,6 @@ def _light_means(
 
 def _means(pixels: Pixels, side: int) -> NDArray[np.float64]:
     return block_sums(pixels.astype(np.float64), side) / side**2
-
-
-def _display(light: NDArray[np.floating]) -> NDArray[np.float32]:
-    return srgb_from_linear(np.clip(light, 0.0, 1.0).astype(np.float32))
 
 
 def _is_cut_out(reference: Image, near: Mask) -> bool:

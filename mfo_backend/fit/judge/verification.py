@@ -12,6 +12,7 @@ from typing import Any, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
+from ...metrics.display.baked_view import HALF_LEVEL
 from ...metrics.display.tone_mapping import View
 from ...metrics.flip.block_means import block_side, full_blocks, means_beside
 from ...metrics.flip.flip_error import shown
@@ -33,7 +34,6 @@ SHOWN_SAMPLES = 4
 # little. With 0.25 the root of the difference is at most 15 % too large.
 NOISE_SHARE = 0.25
 MOST_EVEN = 4  # samples of a part, stratified in each pixel; more would need another kernel and change little
-UNSEEN = 0.002  # of a display's white, half a step of 8 bits
 # Paths of one picture: of a whole one, most of which may be background, and further ones where it is looked at. About
 # a second and a second and a half on two processors; a picture of 256 x 256 stays below both
 MOST_WHOLE, MOST_FURTHER = 1 << 21, 1 << 22
@@ -243,7 +243,7 @@ class Verification:
         """
         first, second = (self._displayed(Image(half, Encoding.LINEAR)) for half in (first, second))
         noise = np.square(first - second) / 4.0  # of their mean
-        if np.median(noise) < UNSEEN**2:
+        if np.median(noise) < HALF_LEVEL**2:
             return False
         difference = np.square(0.5 * (first + second) - self._reference)
         return bool(noise.mean() > NOISE_SHARE * difference.mean())

@@ -16,7 +16,7 @@ COLOR = "base_color"
 # Pictures, each of which scales all colours at once. Of two diffuse walls that see half of each other the worst channel
 # was off by 0.35, 0.026, 0.007 and 0.0009 after one to four (tests/fit/materials/test_rounds.py).
 STEPS = 4
-EVENED_SAMPLES = 8  # of a pixel: only means over targets are looked at
+LOOK_SAMPLES = 8  # of a pixel of a picture that tells how bright targets are, or by how much they have changed
 # Times a colour may grow or shrink in one step, so that a target in the dark does not run away. No measurement.
 MOST_CHANGE = 4.0
 DIM = 1e-4  # of the brightest target: below, a ratio is noise. No measurement.
@@ -36,7 +36,7 @@ def evened_light(
     for _ in range(STEPS):
         for renderer, vector in zip(renderers, present, strict=True):
             renderer.show(vector)
-        image = renderers[0].image(present[0], seed=seed, spp=EVENED_SAMPLES)
+        image = renderers[0].image(present[0], seed=seed, spp=LOOK_SAMPLES)
         for renderer, vector, mask, mean in zip(renderers, present, masks, wanted, strict=True):
             shown = image[mask].mean(axis=0, dtype=np.float64)
             for name in _colors(renderer):

@@ -16,19 +16,18 @@ from ...types.result import FitResult
 from ...types.status import Status
 from ..judge.fit_task import FitTask, check_task
 from ..judge.judged_result import judged_result
-from ..judge.model_gap import model_gap
+from ..judge.model_gap import with_gap
 from ..judge.picture_errors import picture_errors
+from ..judge.verification import MOST_WHOLE, SHOWN_SAMPLES
 from ..pictures.each_picture import SheetJudge
 from ..random_streams import Stream
 from ..result.outcome import FitOutcome
+from .evened_light import LOOK_SAMPLES
 from .rounds import MOST_ROUNDS, Member, Turns, check_members, show_all, take_turns
 
-# Paths of the picture that is judged, and samples of a pixel at least: as `judge.verification` takes of a whole one
-MOST_PATHS, LEAST_SAMPLES = 1 << 21, 4
 # Times `verify_spp`: samples of that picture at most. Noise of its own hides what few pixels show: with 64 samples a
 # pixel in rooms of six, errors of 0.016 to 0.053 looked the same (docs/notebook/several_materials.md).
 MORE_SAMPLES = 4
-START_SAMPLES = 8  # of a pixel of the picture before the fit, which only says from where its errors came
 NOT_STILL = (
     "The light between the materials still moved after {rounds} rounds: fit again from the applied values, or fit "
     "fewer at once."
@@ -84,7 +83,8 @@ def fit_together(
         members, reference, tasks[0].light, recorded, display=display, listener=listener, should_stop=should_stop
     )  # fmt: skip
     starts = [member.renderer.start for member in members]
-    start = np.mean(_halves(members, starts, START_SAMPLES), axis=0, dtype=np.float32)
+    # it only says from where the errors came
+    start = np.mean(_halves(members, starts, LOOK_SAMPLES), axis=0, dtype=np.float32)
     judged, halves = _judged_all(members, tasks, turns, start, turns.present, noted=noted)
     back = [_is_back(result, before.result) for result, before in zip(judged, turns.outcomes, strict=True)]
     if any(back) and not all(back):  # the others are judged beside what they stand beside now
@@ -98,12 +98,11 @@ def fit_together(
         said = (*said, ONCE)
     outcomes = []
     for result, task in zip(judged, tasks, strict=True):
-        gap = None if stopped else model_gap(task.only_counted(end).reference, halves, task.mask, task.view)
-        of_gap = (gap.sentence,) if gap is not None and gap.sentence else ()
-        notes = (*result.notes, OTHERS_HELD, *said, *of_gap)
-        result = replace(result, model_gap=gap, notes=notes)
+        result = replace(result, notes=(*result.notes, OTHERS_HELD, *said))
         if stopped:
             result = replace(result, status=Status.CANCELLED, message=Status.CANCELLED.sentence)
+        else:
+            result = with_gap(result, task.only_counted(end).reference, halves, task.mask, task.view)
         outcomes.append(FitOutcome(result, start, end, task.counted, halves))
     return Together(tuple(outcomes), turns.rounds)
 
@@ -119,7 +118,7 @@ def _judged_all(
 ) -> tuple[list[FitResult], tuple[Pixels, Pixels]]:
     """The results by a picture of all these vectors, and its halves."""
     stopped = tasks[0].should_stop()
-    halves = _halves(members, vectors, LEAST_SAMPLES if stopped else MORE_SAMPLES * members[0].settings.verify_spp)
+    halves = _halves(members, vectors, SHOWN_SAMPLES if stopped else MORE_SAMPLES * members[0].settings.verify_spp)
     end = np.mean(halves, axis=0, dtype=np.float32)
     fitted = np.any([task.mask for task in tasks], axis=0)
     judged = []
@@ -143,7 +142,7 @@ def _halves(members: Sequence[Member], vectors: Sequence[np.ndarray], most: int)
     show_all(members, vectors)
     renderer, settings = members[0].renderer, members[0].settings
     pixels = renderer.target_mask().size
-    samples = max(min(most, MOST_PATHS // pixels), LEAST_SAMPLES) // 2
+    samples = max(min(most, MOST_WHOLE // pixels), SHOWN_SAMPLES) // 2
     seeds = [Stream.GAP.seed(settings.seed, half) for half in (0, 1)]
     first, second = (renderer.image(vectors[0], seed=seed, spp=samples) for seed in seeds)
     return first, second

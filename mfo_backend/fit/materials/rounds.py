@@ -18,16 +18,15 @@ from ...render.sheet.sheet_renderer import SheetRenderer
 from ...types.errors import BadInputError, UnrecordableError
 from ...types.event import Listener
 from ...types.image import Image, Pixels
-from ...types.result import FitResult
 from ...types.status import Status
 from ..judge.checked_reference import check_reference
 from ..plans import RecordedPlan
 from ..random_streams import Stream
 from ..recorded.fit import recorded_scene
 from ..recover_material import recover_material
-from ..result.outcome import FitOutcome
+from ..result.outcome import FitOutcome, result_at
 from ..settings import FitSettings
-from .evened_light import evened_light
+from .evened_light import LOOK_SAMPLES, evened_light
 from .whole_course import SHARES, WholeCourse
 
 MOST_VALUES = 120  # free values of all materials together: about six with all that one picture may show
@@ -39,7 +38,6 @@ MOST_ROUNDS = 4
 # recording; all looked the same in the end. Smaller: rounds that follow noise. Larger: light that is not right.
 LIGHT_MOVED = 0.01
 NOT_YET = "The fit was stopped before it came to this material."
-LOOK_SAMPLES = 8  # of a pixel of the picture that says how far the light has moved; all have the same random numbers
 
 
 Recorded = RecordedScene | RecordedSheet | None  # None where whole light paths are traced
@@ -192,22 +190,9 @@ def _share_needs(recorded: Sequence[Recorded], at: int) -> None:
 def _as_it_was(member: Member) -> FitOutcome:
     """The outcome of a material whose turn did not come."""
     renderer, mask = member.renderer, member.renderer.target_mask()
-    own = renderer.table.unpack(renderer.start)
-    result = FitResult(
-        status=Status.CANCELLED,
-        message=Status.CANCELLED.sentence,
-        model=renderer.model,
-        initial=own,
-        recovered=dict(own),
-        bounds={p.name: (p.lower, p.upper) for p in renderer.table},
-        stages=(),
-        errors={},
-        seconds=0.0,
-        passes=renderer.passes,
-        notes=(NOT_YET,),
-    )
+    result = result_at(renderer, renderer.start, Status.CANCELLED, Status.CANCELLED.sentence, 0.0)
     nothing = np.zeros((*mask.shape, 3), np.float32)
-    return FitOutcome(result, nothing, nothing, mask)
+    return FitOutcome(replace(result, notes=(NOT_YET,)), nothing, nothing, mask)
 
 
 def show_all(members: Sequence[Member], vectors: Sequence[NDArray[np.float64]]) -> None:
@@ -217,7 +202,7 @@ def show_all(members: Sequence[Member], vectors: Sequence[NDArray[np.float64]]) 
 
 
 def _look(members: Sequence[Member], present: Sequence[NDArray[np.float64]], seed: int) -> Pixels:
-    """A picture of all materials as they are now."""
+    """A picture of all materials as they are now; all of them have the same random numbers."""
     show_all(members, present)
     return members[0].renderer.image(present[0], seed=Stream.TOGETHER.seed(seed), spp=LOOK_SAMPLES)
 

@@ -14,8 +14,7 @@ from ...types.event import Listener, Preview, Progress, StageEnd
 from ...types.image import Pixels
 from ...types.result import CurvePoint, StageReport
 from ...types.status import Status
-from ..result.best_so_far import BestSoFar
-from ..result.course import PREVIEW_SECONDS
+from ..result.best_so_far import ONCE_SECONDS, BestSoFar
 
 
 @dataclass(frozen=True)
@@ -80,7 +79,7 @@ class StageLog:
             self._unseen = step.image
             self._best.found(self._name, step.vector)
         self._best.tell(now)
-        if self._unseen is not None and now - self._previewed >= PREVIEW_SECONDS:
+        if self._unseen is not None and now - self._previewed >= ONCE_SECONDS:
             self._previewed = now
             self._listener(Preview(self._unseen))
             self._unseen = None

@@ -14,13 +14,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...solve.bounded_least_squares import NormalEquations, SolveLimits, solve_bounded
+from ...types.parameter import Vector
 from ...types.result import Contradiction
 from ..plans import NEAR_EVALUATIONS
+from ..result.outcome import listed
 from ..squares.problem import Problem
 from ..squares.residuals import gram_of, residual_rows
-from ..tolerances import AGAINST_REST, AT_NOISE, TOLD_APART
-
-Vector = NDArray[np.float64]
+from ..tolerances import AGAINST_REST, AT_NOISE
 
 
 def contradiction(
@@ -71,7 +71,7 @@ def contradiction(
     gains = min(together.mean(), again) / rest
     if should_stop() or again < AT_NOISE**2 or gains.max() < AGAINST_REST:
         return None
-    named = tuple(label for label, gain in zip(labels, gains, strict=True) if gain > gains.max() / TOLD_APART)
+    named = tuple(label for label, gain in zip(labels, gains, strict=True) if gain > gains.max() / AGAINST_REST)
     return Contradiction(named, _sentence(named, len(labels)))
 
 
@@ -87,8 +87,6 @@ def _sentence(named: Sequence[str], count: int) -> str:
     cure = "Correct it, or leave it out."
     if len(named) == 1:
         return f"Picture {named[0]} does not go with the rest: its light or camera differs from its scene. {cure}"
-    listed = f"{', '.join(named[:-1])} and {named[-1]}"
     rest = "" if len(named) == count else " with the rest"
-    return (
-        f"Pictures {listed} do not go together{rest}: the light or camera of one of them differs from its scene. {cure}"
-    )
+    wrong = "the light or camera of one of them differs from its scene"
+    return f"Pictures {listed(named)} do not go together{rest}: {wrong}. {cure}"

@@ -29,17 +29,16 @@ from ...render.paths.recorded_scene import RecordedScene
 from ...render.sheet.turned_camera import View, side_by_side, target_center, turn_about, view_of
 from ...types.certainty import Certainty, Level
 from ...types.errors import BadInputError
-from ...types.parameter import ParameterTable
+from ...types.parameter import ParameterTable, Vector
 from ...types.result import NextPicture
 from ..alike.compare import Comparison
 from ..candidates import Candidates
 from ..certainty.covariance import Further, covariance
+from ..result.outcome import listed
 from ..squares.problem import Rival
 from ..squares.recording_noise import MOST_OWN, rows_of_samples, without_own_noise
 from ..squares.residuals import RelativeResidual
-from ..tolerances import DETERMINED_BELOW, NOTHING_KNOWN, PERHAPS_ABSENT, WORTH_A_PICTURE
-
-Vector = NDArray[np.float64]
+from ..tolerances import CHANCE, DETERMINED_BELOW, NOTHING_KNOWN, WORTH_A_PICTURE
 
 TURNS = tuple(range(0, 360, 30))  # degrees; the first is the present camera
 LAMP_TURNS = (90, 180, 270)  # degrees
@@ -153,7 +152,7 @@ def open_values(x: Vector, certainty: Mapping[str, Certainty], user: Vector, tab
     def may_be_absent(amount: str | None) -> bool:
         if amount is None or amount not in certainty:
             return False  # it is given
-        return bool((x[table.slice_of(amount)] <= PERHAPS_ABSENT * np.array(certainty[amount].sd)).all())
+        return bool((x[table.slice_of(amount)] <= CHANCE * np.array(certainty[amount].sd)).all())
 
     left = (name for name, c in certainty.items() if c.level is not Level.DETERMINED)
     names = tuple(name for name in left if not may_be_absent(AMOUNT_OF.get(name)))
@@ -333,7 +332,7 @@ def _distance(rows: Vector, own: Vector | None, own_at_solution: Vector | None) 
 
 def _gram(rows: Vector, own: Vector | None, table: ParameterTable) -> Vector:
     """Products of derivatives by values in widths of the box, summed, without the recording's own noise."""
-    width = table.upper - table.lower
+    width = table.width
     scaled = (rows[:, :, 1:] * width).reshape(-1, table.length)
     if own is None:
         return scaled.T @ scaled
@@ -363,7 +362,8 @@ def _proposal(
     if not settles and not surer:
         return None
     width = {name: table[name].upper - table[name].lower for name in wanted}
-    what = f"would settle {_listed(settles, table)}" if settles else f"would make {_listed(surer, table)} surer"
+    words = listed([table[name].shown for name in settles or surer])
+    what = f"would settle {words}" if settles else f"would make {words} surer"
     return NextPicture(
         turn=_signed(choice.turn),
         center=(float(center[0]), float(center[1]), float(center[2])),
@@ -384,8 +384,3 @@ def _around(turn: float) -> str:
     signed = _signed(turn)
     way = "against the clock" if signed > 0 else "clockwise"
     return f"by {abs(signed):.0f} degrees around the object ({way} from above)"
-
-
-def _listed(names: Sequence[str], table: ParameterTable) -> str:
-    words = [table[name].shown for name in names]
-    return words[0] if len(words) == 1 else f"{', '.join(words[:-1])} and {words[-1]}"

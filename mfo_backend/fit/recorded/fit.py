@@ -139,7 +139,7 @@ class RecordedRoute:
         task, scene, renderer = self._task, self._scene, self._renderer
         glance = partial(self.verification.glance, elsewhere=task.light) if self._alone else None
         course = Course(renderer, self.stages, task.listener, task.should_stop, task.began, glance)
-        setting = Setting.of(scene, task.light, task.mask, self._plan, task.settings.seed, course, task.clipped)
+        setting = Setting(scene, task.light, task.mask, self._plan, task.settings.seed, course, task.clipped)
         started = (
             start_from_nothing(setting, _censored(log_residual, task))
             if self._begin is None
@@ -160,8 +160,8 @@ class RecordedRoute:
         disagree = self._contradiction(end, kept)
         later, notes, counts = self._perceptual(end, kept, others)
         notes = [*scene.needs.notes, *notes]
-        if setting.fireflies:
-            notes.append(f"{setting.fireflies} fireflies in the reference were left out of the search for a start.")
+        if fireflies := setting.without_fireflies[1]:
+            notes.append(f"{fireflies} fireflies in the reference were left out of the search for a start.")
         if setting.sampled and end.recording.number > 1:
             times = end.recording.number
             notes.append(f"The light was recorded {times} times: the solution had moved away from the first.")
@@ -198,9 +198,8 @@ class RecordedRoute:
             return None
         pictures = 1 if task.sheet is None else len(task.sheet)
         setting = end.recording.setting
-        width = setting.table.upper - setting.table.lower
         doubts = tuple(
-            Doubt(rival, (rival.x - kept.x) / width, compare(end.refined.all, kept.x, rival.x))
+            Doubt(rival, (rival.x - kept.x) / setting.table.width, compare(end.refined.all, kept.x, rival.x))
             for rival in end.refined.rivals
         )
         judged = Judged(setting, end.refined, setting.sampled)

@@ -115,7 +115,7 @@ class Judged:
         problem, table = self._problem, self._setting.table
         coarser = None if problem.coarser is None else self._rows_of(problem.coarser, x)
         spread = covariance(*self.rows(x), table, self.model_error, coarser=coarser)
-        spread = with_rivals(spread, x, self._rivals, table.upper - table.lower)
+        spread = with_rivals(spread, x, self._rivals, table.width)
         return 2.0 * problem.equations(x).cost, certainties(standard_deviations(spread, table), table, spread), spread
 
     @property

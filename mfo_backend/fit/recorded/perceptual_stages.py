@@ -14,10 +14,10 @@ from ..judge.minimise_flip import minimise_flip
 from ..judge.picture_judge import PictureJudge
 from ..plans import PERCEPTUAL_EVALUATIONS
 from ..result.outcome import End
+from ..search.race_starts import different
 from ..settings import FitSettings
 from ..squares.problem import Problem
 from ..squares.residuals import MakeResidual
-from ..tolerances import ANOTHER_BASIN
 from .recording import Recording, Vector
 from .solve import solve, solve_within
 
@@ -56,12 +56,9 @@ def perceptual_ends(
             notes.append("The picture is too large to be recorded whole: the stage 'flip' was left out.")
         return ends, notes
     if flip and not setting.course.should_stop():
-        nearest: list[Vector] = []
-        width = setting.table.upper - setting.table.lower
-        for x in sorted([start, *(end.x for end in ends)], key=lambda x: judge.value(recording.picture(x))):
-            if all(np.max(np.abs(x - other) / width) > ANOTHER_BASIN for other in nearest):
-                nearest.append(x)
-        ends += [End("flip", x) for x in _lower_flip(recording, judge, nearest[:FLIP_STARTS], box)]
+        nearest = sorted([start, *(end.x for end in ends)], key=lambda x: judge.value(recording.picture(x)))
+        starts = different(nearest, setting.table, FLIP_STARTS)
+        ends += [End("flip", x) for x in _lower_flip(recording, judge, starts, box)]
     if len(ends) <= FINALISTS:
         return ends, notes
     return sorted(ends, key=lambda end: judge.value(recording.picture(end.x)))[:FINALISTS], notes

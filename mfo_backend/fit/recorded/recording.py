@@ -15,7 +15,7 @@ from ...render.paths.recorded_paths import LaneGroups, RecordedPaths
 from ...render.paths.recorded_scene import MOST_LANES, RecordedScene
 from ...render.sheet.recorded_sheet import RecordedSheet
 from ...types.image import Pixels
-from ...types.parameter import ParameterTable
+from ...types.parameter import ParameterTable, Vector
 from ..plans import RecordedPlan
 from ..random_streams import Stream
 from ..result.course import Course
@@ -24,8 +24,6 @@ from ..squares.residuals import MakeResidual, MakeWeighted, OneSidedResidual, We
 from ..tolerances import MODEL_ERROR
 from .reference_noise import TileNoise, tile_noise
 from .where_to_look import all_groups, detail_grid, without_fireflies
-
-Vector = NDArray[np.float64]
 
 SAMPLES = 2  # of the light in a recording at the solution: their difference shows the recording's own noise
 
@@ -38,9 +36,6 @@ class Setting:
     ----------
     reference
         The picture as scene-linear radiance, float32 (height, width, 3).
-    calm, fireflies
-        The same without fireflies, and how many there were. A start is found and noise is measured on it; under lights
-        of no extent it is the reference, for there a highlight may well be a pixel wide.
     mask
         Pixels that see the target, True (height, width).
     clipped
@@ -49,28 +44,24 @@ class Setting:
 
     scene: RecordedScene | RecordedSheet
     reference: Pixels = field(repr=False)
-    calm: Pixels = field(repr=False)
-    fireflies: int
     mask: NDArray[np.bool_] = field(repr=False)
-    clipped: NDArray[np.float32] | None = field(repr=False)
     plan: RecordedPlan
     seed: int
     course: Course
+    clipped: NDArray[np.float32] | None = field(default=None, repr=False)
 
-    @classmethod
-    def of(
-        cls,
-        scene: RecordedScene | RecordedSheet,
-        reference: Pixels,
-        mask: NDArray[np.bool_],
-        plan: RecordedPlan,
-        seed: int,
-        course: Course,
-        clipped: NDArray[np.float32] | None = None,
-    ) -> Setting:
-        """The setting with its fireflies counted."""
-        calm, fireflies = without_fireflies(reference, mask) if scene.needs.sampled else (reference, 0)
-        return cls(scene, reference, calm, fireflies, mask, clipped, plan, seed, course)
+    @cached_property
+    def without_fireflies(self) -> tuple[Pixels, int]:
+        """The reference without fireflies, and how many there were. A start is found and noise is measured on it.
+
+        Under lights of no extent it is the reference, for there a highlight may well be a pixel wide.
+        """
+        return without_fireflies(self.reference, self.mask) if self.sampled else (self.reference, 0)
+
+    @property
+    def calm(self) -> Pixels:
+        """The reference without fireflies."""
+        return self.without_fireflies[0]
 
     @property
     def table(self) -> ParameterTable:

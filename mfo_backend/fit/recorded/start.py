@@ -124,5 +124,4 @@ def _race(setting: Setting, problem: Problem, starts: Sequence[Vector], stage: S
     def attempt(start: Vector, evaluations: int, known: float) -> Solution:
         return solve(setting, problem, start, evaluations, stage=stage, known=known)
 
-    table = setting.table
-    return race(attempt, starts, table.upper - table.lower, setting.plan, setting.course.should_stop)
+    return race(attempt, starts, setting.table, setting.plan, setting.course.should_stop)

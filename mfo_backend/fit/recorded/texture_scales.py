@@ -13,7 +13,6 @@ from .where_to_look import fewer_groups
 # Neighbours are 6 % apart in a range of a factor of 16; the basin of a noise's scale is 4 to 5 % wide to both sides
 TRIED = 48
 KEPT = 2  # of a scale, that fits start from
-LANES = 60_000  # of the recording that they are compared on
 
 Placed = dict[int, float]  # values by entry of the vector
 
@@ -29,13 +28,13 @@ def best_scales(setting: Setting, recording: Recording) -> list[Placed]:
         return [{}]
     first = setting.table.length - graph.table.length
     groups = recording.paths.pixel_groups(recording.paths.interior)
-    groups = fewer_groups(groups, setting.calm, LANES)
+    groups = fewer_groups(groups, setting.calm, setting.plan.start_lanes)
     reference = groups.average(setting.calm)
     best: list[Placed] = [{}]
     for entry in (first + j for j in graph.scanned):
         lower, upper = setting.table.lower[entry], setting.table.upper[entry]
         values = np.geomspace(lower, upper, TRIED) if lower > 0.0 else np.linspace(lower, upper, TRIED)
-        vectors = [_at(setting.user, {**best[0], entry: float(value)}) for value in values]
+        vectors = [placed(setting.user, {**best[0], entry: float(value)}) for value in values]
         image = setting.scene.images_of(recording.paths, groups, setting.user)
         costs = []
         for pictures in graph.plain([vector[first:] for vector in vectors]):
@@ -52,10 +51,6 @@ def best_scales(setting: Setting, recording: Recording) -> list[Placed]:
 
 def placed(x: Vector, values: Placed) -> Vector:
     """The vector with these values."""
-    return _at(x, values)
-
-
-def _at(x: Vector, values: Placed) -> Vector:
     moved = x.copy()
     for entry, value in values.items():
         moved[entry] = value

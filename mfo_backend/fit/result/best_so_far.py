@@ -10,10 +10,10 @@ from numpy.typing import NDArray
 
 from ...render.pictures.renderer import Renderer
 from ...types.event import BestValues, Listener
-from ...types.result import FitResult
 from ...types.status import Status
+from .outcome import result_at
 
-_QUIET_SECONDS = 1.0  # between two of them; each becomes a file
+ONCE_SECONDS = 1.0  # no more than one file of best values, and one preview, in this time
 
 
 class BestSoFar:
@@ -37,21 +37,9 @@ class BestSoFar:
     def tell(self, now: float | None = None, *, at_once: bool = False) -> None:
         """Tell what was noted since, where it is time for it; `now` is the monotonic clock by default."""
         now = time.monotonic() if now is None else now
-        if self._vector is None or not (at_once or now - self._told >= _QUIET_SECONDS):
+        if self._vector is None or not (at_once or now - self._told >= ONCE_SECONDS):
             return
-        table = self._renderer.table
         # a scan holds its nodes, which narrowed bounds may leave out
-        vector, self._vector, self._told = table.clip(self._vector), None, now
-        result = FitResult(
-            status=Status.FAILED,
-            message=f"The fit ended by itself in the stage {self._stage!r}; these are its best values until then.",
-            model=self._renderer.model,
-            initial=table.unpack(self._renderer.start),
-            recovered=table.unpack(vector),
-            bounds={p.name: (p.lower, p.upper) for p in table},
-            stages=(),
-            errors={},
-            seconds=now - self._began,
-            passes=self._renderer.passes,
-        )
-        self._listener(BestValues(result))
+        vector, self._vector, self._told = self._renderer.table.clip(self._vector), None, now
+        message = f"The fit ended by itself in the stage {self._stage!r}; these are its best values until then."
+        self._listener(BestValues(result_at(self._renderer, vector, Status.FAILED, message, now - self._began)))

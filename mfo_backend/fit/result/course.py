@@ -9,19 +9,17 @@ from contextlib import contextmanager
 from dataclasses import dataclass, field
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ...render.pictures.renderer import Renderer
 from ...solve.bounded_least_squares import NormalEquations
 from ...types.event import Listener, Preview, Progress, StageEnd
 from ...types.image import Pixels
+from ...types.parameter import Vector
 from ...types.result import CurvePoint, StageReport
 from ...types.status import Status
-from .best_so_far import BestSoFar
+from .best_so_far import ONCE_SECONDS, BestSoFar
 
-Vector = NDArray[np.float64]
 _QUIET_SECONDS = 0.05  # between two progress events; an iteration takes about a millisecond
-PREVIEW_SECONDS = 1.0  # no more than one preview in this time
 
 # What the stages take of the time of a fit, and how many evaluations they need: rough means for the time left
 _EXPECTED = {
@@ -132,7 +130,7 @@ class Course:
 
     def _show(self, stage: Stage, now: float) -> None:
         """Tell a preview of the stage's best, where that is new."""
-        if stage.best is not None and now - self._shown >= PREVIEW_SECONDS:
+        if stage.best is not None and now - self._shown >= ONCE_SECONDS:
             self.show(stage, stage.best)
 
     def show(self, stage: Stage, x: Vector) -> None:

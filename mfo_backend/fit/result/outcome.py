@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from ...render.pictures.renderer import Renderer
 from ...types.certainty import Certainty, WeakCombination
 from ...types.image import Pixels
-from ...types.parameter import ParameterTable
+from ...types.parameter import ParameterTable, Vector
 from ...types.result import Contradiction, FitResult, NextPicture, StageReport
 from ...types.status import Status
 
@@ -114,10 +114,32 @@ class FitOutcome:
     result_halves: tuple[Pixels, Pixels] | None = field(default=None, repr=False)
 
 
+def listed(words: Sequence[str]) -> str:
+    """What a sentence makes of words: "a", "a and b", "a, b and c"."""
+    return words[0] if len(words) == 1 else f"{', '.join(words[:-1])} and {words[-1]}"
+
+
 def kept_note(names: Iterable[str], table: ParameterTable) -> str:
     """The sentence on values that went back to the user's."""
     shown = ", ".join(table[name].label or name for name in names)
     return f"The picture does not determine {shown}: kept as in the scene."
+
+
+def result_at(renderer: Renderer, vector: Vector, status: Status, message: str, seconds: float) -> FitResult:
+    """The result with these values, of which nothing else is known."""
+    table = renderer.table
+    return FitResult(
+        status=status,
+        message=message,
+        model=renderer.model,
+        initial=table.unpack(renderer.start),
+        recovered=table.unpack(vector),
+        bounds={p.name: (p.lower, p.upper) for p in table},
+        stages=(),
+        errors={},
+        seconds=seconds,
+        passes=renderer.passes,
+    )
 
 
 def final_result(
@@ -147,18 +169,12 @@ def final_result(
         message += f" {START_KEPT}"
     if found.contradiction is not None:
         message += f" {found.contradiction.sentence}"
-    table, end = renderer.table, found.ends[choice.end]
-    return FitResult(
-        status=status,
-        message=message,
-        model=renderer.model,
-        initial=table.unpack(renderer.start),
-        recovered=table.unpack(end.x if choice.beats_start else renderer.start),
-        bounds={p.name: (p.lower, p.upper) for p in table},
+    end = found.ends[choice.end]
+    vector = end.x if choice.beats_start else renderer.start
+    return replace(
+        result_at(renderer, vector, status, message, time.monotonic() - began),
         stages=found.stages,
         errors=dict(errors),
-        seconds=time.monotonic() - began,
-        passes=renderer.passes,
         certainty=dict(end.certainty),
         notes=(*found.notes, *found.chosen_notes(choice), *notes),
         weak_combinations=end.weak_combinations,

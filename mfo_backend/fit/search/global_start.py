@@ -8,12 +8,9 @@ from dataclasses import dataclass
 from itertools import product
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ...solve.bounded_least_squares import NormalEquations, Solution, SolveLimits, solve_bounded
-from ...types.parameter import ParameterTable
-
-Vector = NDArray[np.float64]
+from ...types.parameter import ParameterTable, Vector
 
 # Geometric in the lobe width: neighbours' highlights overlap, so one of them lies in the right basin.
 ROUGHNESS_NODES = (0.05, 0.08, 0.12, 0.18, 0.27, 0.4, 0.6, 0.9)
@@ -103,7 +100,7 @@ def agreeing_ends(
 
 def random_start(table: ParameterTable, seed: int) -> Vector:
     """A start anywhere in the box but near its walls."""
-    return table.lower + (table.upper - table.lower) * np.random.default_rng(seed).uniform(0.1, 0.9, table.length)
+    return table.lower + table.width * np.random.default_rng(seed).uniform(0.1, 0.9, table.length)
 
 
 def best_starts(nodes: Sequence[ScanNode], count: int) -> list[Vector]:

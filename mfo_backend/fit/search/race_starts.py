@@ -3,16 +3,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ...solve.bounded_least_squares import Solution
+from ...types.parameter import ParameterTable, Vector
 from ..plans import RecordedPlan
 from ..tolerances import ANOTHER_BASIN
 
-Vector = NDArray[np.float64]
 # of a start, at most so many evaluations, and the cost of the best solution so far, which it has to be better than
 Solve = Callable[[Vector, int, float], Solution]
 
@@ -22,13 +21,13 @@ _LONGER = 40  # evaluations of those that their trial has not finished
 def race(
     solve: Solve,
     starts: Sequence[Vector],
-    width: Vector,
+    table: ParameterTable,
     plan: RecordedPlan,
     should_stop: Callable[[], bool],
 ) -> list[Solution]:
     """The best solution, then the others that differ from it and from each other and cost little more.
 
-    Starts that fall behind are given up, and all others once one has solved the problem. `width` is that of the box.
+    Starts that fall behind are given up, and all others once one has solved the problem.
     """
     found: list[Solution] = []
     for start in starts:
@@ -49,16 +48,30 @@ def race(
             leader = longer
     alone = _within(leader, plan.solved_rms)
     others = [] if alone else sorted(found, key=lambda solution: solution.equations.cost)
-    return _different([leader, *others], width, plan)
+    return _different([leader, *others], table, plan)
 
 
-def _different(solutions: Sequence[Solution], width: Vector, plan: RecordedPlan) -> list[Solution]:
+def _different(solutions: Sequence[Solution], table: ParameterTable, plan: RecordedPlan) -> list[Solution]:
     chosen = [solutions[0]]
     for solution in solutions[1:]:
-        apart = all(np.max(np.abs(solution.x - other.x) / width) > ANOTHER_BASIN for other in chosen)
-        if apart and solution.equations.cost <= plan.basin_factor * chosen[0].equations.cost:
+        near = solution.equations.cost <= plan.basin_factor * chosen[0].equations.cost
+        if near and is_new(solution.x, [other.x for other in chosen], table):
             chosen.append(solution)
     return chosen[: plan.basins]
+
+
+def different(points: Sequence[Vector], table: ParameterTable, count: int) -> list[Vector]:
+    """The first `count` of the points that are each in another basin than those before."""
+    chosen: list[Vector] = []
+    for x in points:
+        if len(chosen) < count and is_new(x, chosen, table):
+            chosen.append(x)
+    return chosen
+
+
+def is_new(x: Vector, others: Iterable[Vector], table: ParameterTable) -> bool:
+    """Whether a vector is in another basin than all others."""
+    return all(table.apart(x, other) > ANOTHER_BASIN for other in others)
 
 
 def _within(solution: Solution, rms: float) -> bool:

@@ -15,9 +15,8 @@ from numpy.typing import NDArray
 
 from ...render.paths.recorded_image import TwoSamples
 from ...solve.bounded_least_squares import NormalEquations
+from ...types.parameter import Vector
 from .residuals import Residual, gram_of, rows_and_slope, sloped
-
-Vector = NDArray[np.float64]
 
 # Of the own noise where a problem was made: no more than this is taken away. Far from the material that was recorded
 # few lanes carry the light, and what they say of their noise is noise itself.

@@ -12,9 +12,9 @@ from numpy.typing import NDArray
 from ...metrics.display.baked_view import BakedView
 from ...metrics.responses.response import ChannelResponse, Logarithmic, Response
 from ...solve.bounded_least_squares import NormalEquations
+from ...types.parameter import Vector
 from ..tolerances import DIM_FLOOR, MODEL_ERROR
 
-Vector = NDArray[np.float64]
 Rows = NDArray[np.float32]
 ImageAndJacobian = Callable[[Vector], Rows]  # (g, 3, 1 + k): the image and its derivatives
 # Display values a stop; where a display shows no more, this alone leads back. A level of 8 bits is 0.004, so two

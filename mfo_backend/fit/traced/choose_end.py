@@ -6,15 +6,15 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ...render.camera.primary_rays import TILE
+from ...types.parameter import Vector
 from ..plans import TransmissionPlan
 from ..random_streams import Stream
 from .pictures import TracedTiles
 
-Vector = NDArray[np.float64]
-
-GUARD_PARTS = 4  # times that paths are traced, at most; more only while it is open which end is better
+# Times that paths are traced, at most; more only while it is open which end is better
+GUARD_PARTS = Stream.CHOOSE.value.length
 
 
 def choose_end(
@@ -37,7 +37,7 @@ def choose_end(
     if counts is not None:
         samples = counts.count
         most = min(most, plan.counted_paths // (len(candidates) * samples))
-    tiles = pictures.tiles(4, most)
+    tiles = pictures.tiles(TILE, most)
     parts: list[Vector] = []
     chosen = 0
     for part in range(GUARD_PARTS):

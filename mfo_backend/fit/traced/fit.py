@@ -9,13 +9,12 @@ from collections.abc import Callable, Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ...render.pictures.mitsuba_renderer import MitsubaRenderer
 from ...types.certainty import Certainty, Level
 from ...types.errors import NoNearerError
 from ...types.image import Pixels
-from ...types.parameter import ParameterTable
+from ...types.parameter import ParameterTable, Vector
 from ..certainty.covariance import certainties, certainties_away
 from ..judge.fit_task import FitTask
 from ..judge.picture_judge import PictureJudge
@@ -41,7 +40,6 @@ if TYPE_CHECKING:  # the module needs Mitsuba's variant to be set
 STAGES = ("scan", "race", "polish")
 _LOOK_SPP = 32  # of a picture between two stages; its noise is taken out of what is compared
 _PREVIEW_PATHS, _PREVIEW_SPP = 1 << 15, 2  # a quarter of a launch, whatever the size of the picture
-Vector = NDArray[np.float64]
 
 
 class TracedRoute:
@@ -214,7 +212,7 @@ def _certainty(ends: Sequence[Polished], table: ParameterTable) -> dict[str, Cer
         spread = end.covariance + _of_one_absorption(end, table)
         found = np.maximum(variance, np.diag(spread)) if doubted else np.diag(spread)
         variance = np.where(end.kept, variance, found)
-    least = np.where(ends[-1].unseen, WEAK_BELOW * (table.upper - table.lower), 0.0)
+    least = np.where(ends[-1].unseen, WEAK_BELOW * table.width, 0.0)
     spread = ends[-1].covariance + _of_one_absorption(ends[-1], table)
     return certainties(np.maximum(np.sqrt(variance), least), table, spread)
 

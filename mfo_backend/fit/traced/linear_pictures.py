@@ -9,8 +9,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...metrics.display.tone_mapping import View
+from ...render.camera.primary_rays import TILE
 from ...render.paths.recorded_image import TwoSamples
 from ...types.image import Image, Pixels
+from ...types.parameter import Vector
 from ..judge.model_gap import model_gap
 from ..random_streams import Stream
 from .pictures import TracedTiles
@@ -22,9 +24,7 @@ MOST_PIXELS = 1 << 16  # whole pictures are needed; of more pixels one takes too
 HALF_PATHS = 1 << 19
 HALF_SAMPLES = (4, 32)  # of a pixel, at least and at most
 LINEAR_WITHIN = 0.1  # of the range: as far as one linear picture is trusted
-TILE = 4  # pixels: averages noise before the response of an eye bends it
 
-Vector = NDArray[np.float64]
 Rows = NDArray[np.float32]
 
 
@@ -36,8 +36,9 @@ class LinearPictures:
     """
 
     def __init__(self, pictures: TracedTiles, seed: int) -> None:
+        # tiles average noise before the response of an eye bends it
         self.tiles = pictures.tiles(TILE, pictures.mask.size)
-        self.width = pictures.paths.table.upper - pictures.paths.table.lower
+        self.width = pictures.paths.table.width
         self._pictures, self._seed = pictures, seed
         self._samples = int(np.clip(HALF_PATHS // max(len(self.tiles.pixels), 1), *HALF_SAMPLES))
 

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...solve.bounded_least_squares import SolveLimits, solve_bounded
+from ...types.parameter import Vector
 from ..judge.minimise_flip import minimise_flip
 from ..judge.picture_judge import PictureJudge
 from ..plans import PERCEPTUAL_EVALUATIONS
@@ -22,8 +23,6 @@ FLIP = "flip"
 ROUNDS = 2  # linear pictures of the stage `flip`; a third changed nothing
 SHORT_WAY = 0.01  # of the range: a shorter way needs no other picture
 STAGE_COST_CHANGE = 1e-4  # relative, of a step that ends them
-
-Vector = NDArray[np.float64]
 
 
 def lower_seen_error(

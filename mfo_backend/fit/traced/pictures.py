@@ -15,6 +15,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...types.image import Pixels
+from ...types.parameter import Vector
+from ..tolerances import SIGNIFICANT
 from .sample_count import EqualCounts, NoiseComparison, Recount, TwoPictures, equal_counts, recount
 from .tile_rows import CHANNELS, LARGEST_TILE, TileRows
 
@@ -23,13 +25,11 @@ if TYPE_CHECKING:  # the module needs Mitsuba's variant to be set
 from ...solve.bounded_least_squares import NormalEquations
 from ...solve.noisy_least_squares import cross_equations
 
-Vector = NDArray[np.float64]
 Samples = list[NDArray[np.float32]]
 
 Rows = NDArray[np.float32]
 
 BRIGHT = 10.0  # weighted residual: about eleven times the reference
-SURE = 3.0  # standard errors
 GEOMETRIC = ("roughness", "ior")  # they move the paths
 SECANT_BELOW = 0.25  # roughness; above it the derivative of a fixed path has less noise than a secant of moving ones
 # Wide ones blur what they look at, narrow ones are noisy (docs/notebook/glass.md: 0.03 and 0.06 of the index)
@@ -160,7 +160,7 @@ def two_half_equations(a: Rows, b: Rows) -> NormalEquations:
 def is_unsure(a: Rows, b: Rows) -> bool:
     """Whether the mean square of two samples of the rows is less than three of its standard errors over tiles."""
     squares = (a[:, 0].astype(np.float64) * b[:, 0]).reshape(-1, CHANNELS).mean(axis=1)
-    return bool(squares.mean() < SURE * squares.std() / np.sqrt(len(squares)))
+    return bool(squares.mean() < np.sqrt(SIGNIFICANT / len(squares)) * squares.std())
 
 
 def _capped(rows: Rows) -> NDArray[np.float64]:

@@ -9,6 +9,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from ...render.camera.primary_rays import TILE
 from ..alike.unneeded_lobes import values_off
 from ..random_streams import Stream
 from ..result.course import Stage
@@ -18,17 +19,19 @@ from .polished import AMOUNTS, Polished, without_lobe
 from .sample_count import MOST_COUNT
 from .sample_pools import TilePools
 from .search import Setting, Vector
+from .tile_rows import LARGEST_TILE
 
 COAT_NODES = (0.1, 0.3, 0.6)  # roughness, besides the scene's
 COAT = 0.3  # weight they start from
 SURELY_OFF = 0.05  # of the range: standard deviation of an amount that can be told from none
-TILE_SIZES = (1, 2, 4, 8)
+TILE_SIZES = (1, 2, 4, LARGEST_TILE)
 SETTLED = 2  # times in a row that the expected error has to be small: it is an estimate itself
-LEAST_STEPS = 4  # two steps alone once looked settled with a value off by a tenth of its range
 MOST_SAMPLES = 16  # of a pixel in a step of the polish
 GROWTH = 4  # of a step's samples, at most
 OWN = 0.25  # of the expected error: below, more samples help little
-FEW_STEPS = 4  # before, the error is that of few samples everywhere
+# Before, the expected error is that of few samples everywhere, and says nothing: two steps alone once looked settled
+# with a value off by a tenth of its range
+FEW_STEPS = 4
 FAR = {True: 0.015, False: 0.06}  # of the range, of sharp materials and others: samples from so far away count half
 MOST_COUNTINGS = 3  # of the reference's samples
 COUNTED_STEPS = 3  # between them
@@ -95,7 +98,7 @@ def _coated(setting: Setting, x: Vector) -> Vector:
     xs[1:, roughness] = np.reshape(COAT_NODES, (-1, 1))
     xs[:, weight] = COAT
     frozen = setting.extras & ~table.mask_of(lobe[:1])
-    tiles, best = setting.pictures.tiles(4, plan.coat_pixels), x
+    tiles, best = setting.pictures.tiles(TILE, plan.coat_pixels), x
     for _ in range(plan.scan_steps + 1):
         rows = setting.pictures.halves(tiles, xs, seed=Stream.COAT.seed(setting.seed), samples=plan.race_samples)
         if setting.course.should_stop():
@@ -152,7 +155,7 @@ def _pool(
 
     Every step has a number of its own in `stream`, from `first` on.
     """
-    plan, pictures, width = setting.plan, setting.pictures, setting.width
+    plan, pictures, width = setting.plan, setting.pictures, setting.table.width
     stopped, counts = setting.course.should_stop, pictures.counts
     x, equations, size = start.copy(), None, 0
     most = plan.polish_pixels
@@ -189,7 +192,7 @@ def _pool(
             if turn >= FEW_STEPS:
                 samples = min(2 * samples, most)
         settled = settled + 1 if near else 0
-        if settled >= SETTLED and turn + 1 >= LEAST_STEPS:
+        if settled >= SETTLED and turn + 1 >= FEW_STEPS:
             break
     none = np.zeros_like(frozen)
     if equations is None:
@@ -214,5 +217,5 @@ def _pool(
 
 def _moved(setting: Setting, step: Vector) -> float:
     """How far a step goes, in parts of the range, in what moves the paths; all else is nearly linear."""
-    table, way = setting.table, np.abs(step) / setting.width
+    table, way = setting.table, np.abs(step) / setting.table.width
     return max((float(way[table.slice_of(name)].max()) for name in GEOMETRIC if name in table.names), default=0.0)

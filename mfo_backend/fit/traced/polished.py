@@ -11,11 +11,9 @@ from numpy.typing import NDArray
 from ...material.principled.blender_selection import AMOUNT_OF
 from ...solve.bounded_least_squares import NormalEquations
 from ...solve.noisy_least_squares import SafeMatrix
-from ...types.parameter import ParameterTable
+from ...types.parameter import ParameterTable, Vector
 from ..alike.unneeded_lobes import dispensable, values_off
 from ..tolerances import SIGNIFICANT, WEAK_BELOW
-
-Vector = NDArray[np.float64]
 
 CORE = ("base_color", "transmission_weight", "roughness", "ior", "absorption_density", "absorption_color")
 AMOUNTS = ("metallic", "coat_weight", "sheen_weight")
@@ -51,7 +49,7 @@ class Polished:
         held = self.kept.copy()
         if self.equations is None:
             return np.zeros_like(held)
-        e, width = self.equations, table.upper - table.lower
+        e, width = self.equations, table.width
         names = [name for name in table.names if not held[table.slice_of(name)].all()]
         while names:
             free = ~held
@@ -82,7 +80,7 @@ class Polished:
         values whose own deviation is below `surer_than`, in parts of the range, are asked for. The distance of several
         together is theirs by the covariance (A. Wald 1943), and each may add as much as it could alone.
         """
-        sure = np.diag(self.covariance) < (surer_than * (table.upper - table.lower)) ** 2
+        sure = np.diag(self.covariance) < (surer_than * table.width) ** 2
         free = ~self.kept & ~unseen & ~table.mask_of(CORE) & sure
         names = [name for name in values_off(table, user) if free[table.slice_of(name)].all()]
 

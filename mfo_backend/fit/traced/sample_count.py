@@ -25,9 +25,9 @@ from numpy.typing import NDArray
 
 from ...metrics.pixels.neighbours import neighbour_pairs, sums_around
 from ...types.image import Pixels
+from ...types.parameter import Vector
 from ..tolerances import DIM_FLOOR
 
-Vector = NDArray[np.float64]
 Values = NDArray[np.floating]
 Shape = tuple[int, ...]
 # (samples a pixel, stream of random numbers) -> two independent pictures (2, p, 3), scene-linear
@@ -40,7 +40,6 @@ LOUD = 0.25  # relative variance of a pixel's radiance; for a calmer reference p
 COUNT_REACH = 3  # pixels to each side that noise is averaged over
 COUNT_LEVEL = 0.1  # of `LEVEL`, for the count: counts of glass' pictures are off by 7 % with it, and by 9 % without
 GROUPS = 24  # of pixels, whose scatter tells how well the noise is known
-LEAST = 1e-30
 LEAST_SLOPE = 0.05  # of the excess by the logarithm of the count: below, noise hardly tells it
 CURVED = 0.03  # of the logarithm: the excess is not quite a straight line
 FURTHEST = float(np.log(2.0))  # a straight line from n to 2 n samples holds no further
@@ -178,9 +177,9 @@ class NoiseComparison:
         model = self._compressed(pictures)
         own = self._roughness(model[::2] - model[1::2])
         others = self._roughness(self._seen - model)
-        influence = own / max(own.sum(), LEAST) - others / max(others.sum(), LEAST)
+        influence = own / max(own.sum(), 1e-30) - others / max(others.sum(), 1e-30)
         variance = GROUPS / (GROUPS - 1) * float(np.sum(np.square(influence - influence.mean())))
-        return NoiseExcess(float(np.log(max(own.sum(), LEAST) / max(others.sum(), LEAST))), variance)
+        return NoiseExcess(float(np.log(max(own.sum(), 1e-30) / max(others.sum(), 1e-30))), variance)
 
     def _compressed(self, radiance: Values) -> Values:
         return np.log1p(np.clip(radiance, 0.0, self._top) / self._level)

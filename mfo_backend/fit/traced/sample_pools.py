@@ -15,9 +15,9 @@ from numpy.typing import NDArray
 
 from ...solve.bounded_least_squares import NormalEquations
 from ...solve.noisy_least_squares import CrossProducts, SafeMatrix, cross_equations
+from ...types.parameter import Vector
 from .tile_rows import CHANNELS, TileRows
 
-Vector = NDArray[np.float64]
 MANY = 50  # the largest tiles of a picture of 128 x 128 are about 100; with the 38 of one of 64 x 64 fits got stuck
 
 

@@ -10,17 +10,16 @@ from itertools import product
 import numpy as np
 from numpy.typing import NDArray
 
+from ...render.camera.primary_rays import TILE
 from ...solve.bounded_least_squares import NormalEquations
 from ...solve.noisy_least_squares import cautious_step
-from ...types.parameter import ParameterTable
+from ...types.parameter import ParameterTable, Vector
 from ..plans import TransmissionPlan
 from ..random_streams import Stream
 from ..result.course import Course, Stage
-from ..tolerances import ANOTHER_BASIN
+from ..search.race_starts import different, is_new
 from .pictures import GEOMETRIC, TracedTiles, is_unsure, two_half_equations
 from .polished import CORE
-
-Vector = NDArray[np.float64]
 
 TRACED_ROUGHNESS_NODES = (0.05, 0.12, 0.22, 0.35, 0.55, 0.85)
 IOR_NODES = (1.1, 1.25, 1.4, 1.55, 1.75, 2.1)
@@ -44,11 +43,6 @@ class Setting:
         return self.pictures.paths.table
 
     @property
-    def width(self) -> Vector:
-        """Of the range of each value."""
-        return self.table.upper - self.table.lower
-
-    @property
     def extras(self) -> NDArray[np.bool_]:
         """Values besides the glass' own, which stay as in the scene until the polish; without glass none does."""
         names = self.table.names
@@ -64,10 +58,11 @@ class Setting:
         noise: Vector | None = None,
     ) -> Vector:
         """A step inside the bounds and no longer than `trust` of the range; the `frozen` values stay."""
-        reach = trust * self.width
+        reach = trust * self.table.width
         lower, upper = np.maximum(self.table.lower - x, -reach), np.minimum(self.table.upper - x, reach)
         lower, upper = np.where(frozen, 0.0, lower), np.where(frozen, 0.0, upper)
-        return cautious_step(equations, np.minimum(lower, 0.0), np.maximum(upper, 0.0), self.width, damping, noise)
+        box = np.minimum(lower, 0.0), np.maximum(upper, 0.0)
+        return cautious_step(equations, *box, self.table.width, damping, noise)
 
     def note(self, stage: Stage, x: Vector, cost: float) -> None:
         """Report a point with the root mean square of its residual."""
@@ -78,14 +73,14 @@ def scan(setting: Setting) -> list[Vector]:
     """Stage `scan`: all nodes of roughness and index with the best other values, best first."""
     plan, table, pictures = setting.plan, setting.table, setting.pictures
     with setting.course.stage("scan") as stage:
-        tiles = pictures.tiles(4, plan.scan_pixels)
+        tiles = pictures.tiles(TILE, plan.scan_pixels)
         nodes = {"roughness": TRACED_ROUGHNESS_NODES, "ior": IOR_NODES}
         held = [name for name in GEOMETRIC if name in table.names]
         middle = setting.start.copy()
         for name in ("base_color", "transmission_weight"):
             if name in table.names:
                 part = table.slice_of(name)
-                middle[part] = table.lower[part] + 0.75 * setting.width[part]
+                middle[part] = table.lower[part] + 0.75 * setting.table.width[part]
         xs = []
         for values in product(*(nodes[name] for name in held)):
             x = middle.copy()
@@ -146,9 +141,10 @@ def race(setting: Setting, nodes: Sequence[Vector]) -> list[Vector]:
     """
     plan, pictures, stopped = setting.plan, setting.pictures, setting.course.should_stop
     with setting.course.stage("race") as stage:
-        tiles = pictures.tiles(4, plan.race_pixels)
+        tiles = pictures.tiles(TILE, plan.race_pixels)
         few = len(tiles.pixels) < pictures.mask.sum()
-        runners = [Runner(x) for x in (*_different(setting, nodes, plan.starts), setting.table.clip(setting.start))]
+        table = setting.table
+        runners = [Runner(x) for x in (*different(nodes, table, plan.starts), table.clip(setting.start))]
         best, cost = runners[0], np.inf
         for turn in range(plan.race_steps + 1):
             trials = np.array([runner.trial(setting) for runner in runners])
@@ -156,7 +152,7 @@ def race(setting: Setting, nodes: Sequence[Vector]) -> list[Vector]:
             if stopped():
                 break
             if few and turn == 0 and is_unsure(*rows[0]):
-                tiles = pictures.tiles(4, 2 * plan.race_pixels)
+                tiles = pictures.tiles(TILE, 2 * plan.race_pixels)
                 seed = Stream.RACE_MORE_PIXELS.seed(setting.seed)
                 rows = pictures.halves(tiles, trials, seed=seed, samples=plan.race_samples)
             runners = [
@@ -173,25 +169,13 @@ def race(setting: Setting, nodes: Sequence[Vector]) -> list[Vector]:
                 if not gained:
                     break
                 runners = _leaders(setting, runners)
-        return _different(setting, [best.x, *(runner.x for runner in runners), *nodes], 1 + RIVALS)
+        return different([best.x, *(runner.x for runner in runners), *nodes], table, 1 + RIVALS)
 
 
 def _leaders(setting: Setting, runners: Sequence[Runner]) -> list[Runner]:
     """Those of the sorted runners that have not fallen behind and are not where a better one is."""
     leader, kept = runners[0].cost, list[Runner]()
     for runner in runners:
-        if runner.cost <= leader + 2.0 * abs(leader) and _is_new(setting, runner.x, [each.x for each in kept]):
+        if runner.cost <= leader + 2.0 * abs(leader) and is_new(runner.x, [each.x for each in kept], setting.table):
             kept.append(runner)
     return kept[:2]
-
-
-def _different(setting: Setting, points: Sequence[Vector], count: int) -> list[Vector]:
-    chosen: list[Vector] = []
-    for x in points:
-        if _is_new(setting, x, chosen):
-            chosen.append(x)
-    return chosen[:count]
-
-
-def _is_new(setting: Setting, x: Vector, others: Sequence[Vector]) -> bool:
-    return all(np.max(np.abs(x - other) / setting.width) > ANOTHER_BASIN for other in others)

@@ -131,7 +131,7 @@ class GraphPictures:
             name_of(socket): tuple(j for j, (value, _) in enumerate(self._components) if socket in value.sockets)
             for socket in self._sockets
         }
-        self._width = self.table.upper - self.table.lower
+        self._width = self.table.width
         self._states: OrderedDict[bytes, GraphState] = OrderedDict()
         self._exact: list[tuple[Vector, GraphState]] = []  # those that were evaluated, the newest last
         self._moves: list[tuple[Vector, Vector]] = []  # between two states, in widths of the box, and how slopes change

@@ -6,8 +6,9 @@ from itertools import product
 import numpy as np
 import pytest
 
-from mfo_backend.fit.judge.minimise_flip import FLIP_EVALUATIONS, minimise_flip
+from mfo_backend.fit.judge.minimise_flip import minimise_flip
 from mfo_backend.fit.judge.picture_judge import PictureJudge, _MaskedBlur
+from mfo_backend.fit.plans import NEAR_EVALUATIONS
 from mfo_backend.fit.settings import FitSettings
 from mfo_backend.metrics.display.tone_mapping import DisplayView
 from mfo_backend.metrics.flip import block_means
@@ -146,7 +147,7 @@ def test_flip_is_asked_a_limited_number_of_times():
     start, box = np.array([-1.2, 1.0]), (np.full(2, -2.0), np.full(2, 2.0))
     options = {"on_value": lambda x, value: told.append((tuple(x), value)), "should_stop": lambda: False}
     x, value = minimise_flip(Valley(), lambda x: (x, lambda gradient: gradient), start, *box, **options)
-    assert len(told) == FLIP_EVALUATIONS
+    assert len(told) == NEAR_EVALUATIONS
     assert (tuple(x), value) == min(told, key=lambda seen: seen[1])
 
 

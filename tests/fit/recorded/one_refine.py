@@ -23,5 +23,5 @@ def refine(renderer: Any, reference: Pixels, start: NDArray[np.float64], plan: R
 
     mask = renderer.target_mask()
     course = Course(renderer, ("refine",), lambda event: None, lambda: False, time.monotonic())
-    setting = Setting.of(RecordedScene(renderer, int(mask.sum())), reference, mask, plan, seed, course)
+    setting = Setting(RecordedScene(renderer, int(mask.sum())), reference, mask, plan, seed, course)
     return refine_sampled(setting, [start], RelativeResidual, WeightedResidual)

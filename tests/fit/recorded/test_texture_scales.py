@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+from mfo_backend.fit.plans import RecordedPlan
 from mfo_backend.fit.recorded.texture_scales import KEPT, TRIED, best_scales, placed
 from mfo_backend.types.parameter import Parameter, ParameterTable
 
@@ -43,7 +44,7 @@ class Fake:
         scene = SimpleNamespace(graph=graph, images_of=lambda paths, groups, vector: self.image)
         course = SimpleNamespace(should_stop=lambda: False)
         self.setting: Any = SimpleNamespace(
-            scene=scene, table=TABLE, user=TABLE.pack({}), calm=reference, course=course
+            scene=scene, table=TABLE, user=TABLE.pack({}), calm=reference, course=course, plan=RecordedPlan()
         )
 
     @staticmethod

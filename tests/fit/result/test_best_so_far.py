@@ -55,7 +55,7 @@ def test_values_are_finite_and_inside_the_bounds(sphere) -> None:
 
 
 def test_the_papers_stages_tell_the_best_under_their_own_loss(sphere, truth, monkeypatch) -> None:
-    monkeypatch.setattr(best_so_far, "_QUIET_SECONDS", 0.0)
+    monkeypatch.setattr(best_so_far, "ONCE_SECONDS", 0.0)
     loss, told = make_loss("mse-hdr", sphere.reference(truth)), []
 
     def listener(event) -> None:

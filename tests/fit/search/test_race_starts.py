@@ -12,8 +12,9 @@ from mfo_backend.fit.plans import RecordedPlan
 from mfo_backend.fit.search.race_starts import race
 from mfo_backend.fit.tolerances import CLEARLY_LOWER
 from mfo_backend.solve.bounded_least_squares import TRIED, NormalEquations, SolveLimits, solve_bounded
+from mfo_backend.types.parameter import Parameter, ParameterTable
 
-LOWER, UPPER = np.array([-3.0]), np.array([3.0])
+TABLE = ParameterTable([Parameter("x", 1, -3.0, 3.0, 0.0)])
 PLAN = RecordedPlan()
 NOISE = 0.5  # a cost that no value lowers
 
@@ -34,11 +35,11 @@ class Valleys:
 
     def solve(self, start, evaluations, known):
         limits = SolveLimits(evaluations, cost_change=1e-9, known=PLAN.basin_factor * known)
-        return solve_bounded(self, start, LOWER, UPPER, replace(limits, wanted=CLEARLY_LOWER * known))
+        return solve_bounded(self, start, TABLE.lower, TABLE.upper, replace(limits, wanted=CLEARLY_LOWER * known))
 
     def race(self, *starts, plan=PLAN):
         starts = [np.array([x]) for x in starts]
-        return race(self.solve, starts, UPPER - LOWER, plan, lambda: False)
+        return race(self.solve, starts, TABLE, plan, lambda: False)
 
 
 @pytest.mark.parametrize("starts", [(0.4, -0.5), (-0.5, 0.4), (-0.5, -2.0, 0.4, 2.5)], ids=str)

@@ -178,7 +178,7 @@ def test_an_opaque_surface_with_alpha_needs_no_other_preset(tmp_path):
 
 
 def test_every_step_can_be_shown(tmp_path, monkeypatch):
-    monkeypatch.setattr("mfo_backend.fit.result.course.PREVIEW_SECONDS", 0.0)
+    monkeypatch.setattr("mfo_backend.fit.result.course.ONCE_SECONDS", 0.0)
     renderer = load(tmp_path, size=24)
     result, events = fit(renderer, renderer.image(renderer.table.pack(TRUTH), seed=5, spp=16))
     previews = [e.image for e in events if isinstance(e, Preview)]
@@ -253,7 +253,7 @@ def test_paths_to_the_noise_of_a_small_picture(tmp_path, monkeypatch):
     renderer = load(tmp_path, size=64)
     from mfo_backend.render.traced.traced_paths import TracedPaths
 
-    monkeypatch.setattr("mfo_backend.fit.result.course.PREVIEW_SECONDS", np.inf)  # they come by the clock
+    monkeypatch.setattr("mfo_backend.fit.result.course.ONCE_SECONDS", np.inf)  # they come by the clock
     launch, launches, passes = TracedPaths._launch, [], []
     monkeypatch.setattr(TracedPaths, "_launch", lambda *given: launches.append(given) or launch(*given))
     for truth in ({}, {"roughness": 0.1, "ior": 1.6}):
