@@ -38,4 +38,17 @@ REASONS = {
     "met with a density of 0.",
     "mfo_backend/metrics/judges/packages.py: sys.modules.pop(name, None) -> pass": "The tests of these judges need the "
     "extra `judges`, which was not installed.",
+    'mfo_backend/scene/hdr_file.py: if not data.startswith(b"#?") or end < 0 or line_end < 0: -> '
+    'if not data.startswith(b"#?") or end < 0 or (line_end <= 0):': _SAME
+    + "a line that ends after the header does not end at its first byte.",
+    'mfo_backend/scene/scene_xml.py: roulette = str(depth + 1) if depth >= 0 else options.get("rr_depth", "5") -> '
+    'roulette = str(depth + 1) if (depth > 0) else options.get("rr_depth", "5")': _SAME
+    + "where no light is followed at all there is nothing that chance could end.",
+    "blender_addon/export/images/image_pixels.py: "
+    "if width == 0 or height == 0 or (not image.has_data and not len(image.pixels)): -> "
+    "if width == 0 or height == 0 or (not image.has_data and (len(image.pixels))):": _SAME
+    + "Blender loads a picture to tell its size, so one that has a size has data.",
+    "blender_addon/export/nodes/closure_leaves.py: if place in above or len(above) > DEEPEST: -> "
+    "if place in above or (len(above) >= DEEPEST):": "A cap on what a stranger's file may ask for: nothing hangs on "
+    "the number.",
 }

@@ -193,3 +193,16 @@ def test_a_wrapper_may_hold_textures_and_must_not_refer_to_nothing() -> None:
     assert target.inner.get("type") == "principled"
     with pytest.raises(BadInputError, match=r"holds 0 BSDFs: one is needed"):
         find_target(scene_of(around.format('<ref id="gone"/>')), "target")
+
+
+def test_only_numbers_and_textures_are_values() -> None:
+    """Words, switches and nested materials have names, too; what has none is no value."""
+    bsdf = ElementTree.fromstring(
+        '<bsdf type="principled"><float name="roughness" value="0.3"/><rgb name="base_color" value="0.1, 0.2, 0.3"/>'
+        '<texture type="bitmap" name="metallic"/><ref id="picture" name="specular"/>'
+        '<string name="distribution" value="ggx"/><boolean name="sample_visible" value="true"/>'
+        '<bsdf type="diffuse" name="below"/><float value="0.7"/></bsdf>'
+    )
+    values, linked = read_values(bsdf)
+    assert values == {"roughness": 0.3, "base_color": (0.1, 0.2, 0.3)}
+    assert linked == ("metallic", "specular")

@@ -207,3 +207,29 @@ def test_grey_numbers_that_are_no_display_values_are_refused(tmp_path, values, k
     PillowImage.fromarray(values).save(tmp_path / "grey.tif")
     with pytest.raises(BadInputError, match=rf"'grey\.tif' holds {kind} values: PNG, JPEG and TIFF must hold 8 or 16"):
         read_image(tmp_path / "grey.tif")
+
+
+def coded_line(*, red):
+    """A Radiance picture of 8 x 1 pixels, its line coded, with these bytes for its red."""
+    plain = bytes([128 + 8, 9])  # a run of eight nines
+    return b"#?RADIANCE\n\n-Y 1 +X 8\n" + bytes([2, 2, 0, 8]) + red + 3 * plain
+
+
+@pytest.mark.parametrize(
+    ("red", "is_read"),
+    [
+        (bytes([128 + 8, 9]), True),
+        (bytes([128 + 5, 9, 3, 1, 2, 3]), True),
+        (bytes([128 + 9, 9]), False),
+        (bytes([128 + 5, 9, 128 + 4, 9]), False),
+        (bytes([0, 128 + 8, 9]), False),
+    ],
+    ids=["one run", "two", "too long", "beyond the line", "of nothing"],
+)
+def test_a_run_ends_with_its_line(tmp_path, red, is_read):
+    (tmp_path / "a.hdr").write_bytes(coded_line(red=red))
+    if is_read:
+        assert read_image(tmp_path / "a.hdr").pixels.shape == (1, 8, 3)
+        return
+    with pytest.raises(BadInputError, match=r"'a\.hdr' cannot be read: the file is damaged or not a Radiance image"):
+        read_image(tmp_path / "a.hdr")
