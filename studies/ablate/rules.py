@@ -13,6 +13,7 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 EXACT, SAMPLED, TRACED, HARD = ("base", "parameters"), ("noise", "cycles"), ("transparency_4spp",), ("hard",)
+GLASS = ("transparency",)
 CLASSES = ("classes",)  # Cycles' pictures of every class of material, from Blender's own
 UNREACHED = ("measured",)  # materials that no values of the model give
 
@@ -56,7 +57,8 @@ def _not_recounted(original: Any) -> Any:
 RULES = (
     # search
     Rule("opposite starts", "fit.search.global_start:agreeing_ends", _constant([]), (*EXACT, *SAMPLED)),
-    Rule("starts of the scan", "fit.search.global_start:best_starts", _constant([]), (*EXACT, *SAMPLED, *CLASSES)),
+    Rule("starts of the scan", "fit.search.global_start:best_starts", _constant([]),
+         (*EXACT, *SAMPLED, *HARD, *CLASSES)),
     Rule("metals in the scan", "fit.search.global_start:METAL_SECOND_NODES", _number(()),
          (*EXACT, *SAMPLED, *CLASSES)),
     Rule("other basins", "fit.alike.exchanges:best_basin", _argument(1), (*EXACT, *HARD)),
@@ -81,14 +83,12 @@ RULES = (
          (*EXACT, *SAMPLED, *HARD)),
     # certainty
     Rule("few pixels that rule a value", "solve.leverage:residuals_left_out", _argument(1),
-         (*EXACT, *SAMPLED, *HARD, *CLASSES)),
+         (*EXACT, *SAMPLED, *GLASS, *HARD, *CLASSES)),
     # perceptual stages
     Rule("all perceptual stages", "fit.recorded.perceptual_stages:perceptual_ends",
          lambda original: lambda *given: ([], []), (*EXACT, *SAMPLED, *UNREACHED)),
     Rule("stage itp", "fit.squares.stage_residuals:finishing_residuals", _without("itp"),
          (*EXACT, *SAMPLED, *UNREACHED)),
-    Rule("stage pu21", "fit.squares.stage_residuals:finishing_residuals", _without("pu21"),
-         (*EXACT, *SAMPLED, *UNREACHED, *CLASSES)),
     Rule("none at the noise", "fit.recorded.fit:AT_NOISE", _number(0.0), (*SAMPLED, *UNREACHED)),
 )  # fmt: skip
 

@@ -18,7 +18,8 @@ def finishing_residuals(
 ) -> dict[str, MakeResidual]:
     """How to make the residuals of each stage, by its name, in order.
 
-    Those are the settings' losses; without them `fast` has none and the other presets have two perceptual ones.
+    Those are the settings' losses; without them `fast` has none and the other presets have dE_ITP, before which a
+    display picture has its own values.
 
     Parameters
     ----------
@@ -39,7 +40,7 @@ def finishing_residuals(
         return {}
     if encoding is Encoding.SRGB or settings.range == "ldr":
         return {"display": _residual("mse-ldr", light, mask, view), "itp": _residual("itp-ldr", light, mask, view)}
-    return {"itp": _residual("itp-hdr", light, mask, view), "pu21": _residual("pu21-hdr", light, mask, view)}
+    return {"itp": _residual("itp-hdr", light, mask, view)}
 
 
 def _residual(name: str, light: Pixels, mask: NDArray[np.bool_], view: View) -> MakeResidual:

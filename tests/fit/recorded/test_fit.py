@@ -101,7 +101,7 @@ def test_each_preset_has_no_more_flip_than_the_one_before(tmp_path):
         outcome, events = fit(renderer, reference, preset=preset)
         found[preset] = outcome.result.errors["hdr_flip"][1]
         stages[preset] = [e.stage for e in events if isinstance(e, StageEnd)]
-    assert stages["balanced"] == ["scan", "start", "refine", "itp", "pu21"]
+    assert stages["balanced"] == ["scan", "start", "refine", "itp"]
     assert stages["best"] == [*stages["balanced"], "flip"]
     # chosen by the FLIP of blurred pictures of the target, compared by that of whole ones: 1 % apart
     assert found["balanced"] <= 1.01 * found["fast"]
@@ -109,6 +109,17 @@ def test_each_preset_has_no_more_flip_than_the_one_before(tmp_path):
     fractions = [e.fraction for e in events if isinstance(e, Progress)]
     assert all(0.0 < f < 1.0 for f in fractions)
     assert fractions == sorted(fractions)
+
+
+def test_a_narrow_highlight_is_found_where_the_metallic_is_given(tmp_path):
+    """No start is opposite then; from the scene's 0.9 and from this seed's random start no slope leads to it."""
+    given = '<float name="metallic" value="0.5"/><float name="roughness" value="0.9"/>'
+    truth = {"base_color": (0.6, 0.3, 0.1), "roughness": 0.08, "specular": 0.6, "clearcoat": 0.4}
+    renderer = load(tmp_path, POINT, tuple(truth), size=32, material=given)
+    reference = renderer.image(renderer.table.pack(truth), seed=9, spp=16)
+    outcome, _ = fit(renderer, reference, seed=1)
+    assert outcome.result.recovered["roughness"] < 0.1
+    assert outcome.result.errors["flip"][1] < 0.05  # 0.16 without the nodes of the scan
 
 
 def test_perceptual_stages_do_not_fit_noise(tmp_path):

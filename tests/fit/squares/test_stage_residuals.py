@@ -39,7 +39,7 @@ def test_presets_without_losses():
         return list(finishing_residuals(FitSettings(**settings), Encoding.LINEAR, reference, mask, DisplayView()))
 
     assert names(preset="fast") == []
-    assert names(preset="balanced") == ["itp", "pu21"]
+    assert names(preset="balanced") == ["itp"]
     assert names(preset="balanced", range="ldr") == ["display", "itp"]
 
 

@@ -46,7 +46,7 @@ def test_flip_is_lower_where_no_values_give_the_picture(blend, fits):
     clean = picture(7, 512)
     flip = make_loss("flip-hdr", Image(clean, Encoding.LINEAR), mask=renderer.target_mask())
     errors = {}
-    for preset, last in (("fast", ["polish"]), ("balanced", ["itp", "pu21"]), ("best", ["itp", "pu21", "flip"])):
+    for preset, last in (("fast", ["polish"]), ("balanced", ["itp"]), ("best", ["itp", "flip"])):
         result = fits[preset]
         assert [stage.name for stage in result.stages][-len(last) :] == last
         (instead,) = (note for note in result.notes if "whole light paths" in note)
@@ -63,7 +63,7 @@ class Given:
     def __init__(self, halves, mask):
         self._halves, self.mask, self.counts = halves, mask, None
         self.reference = np.zeros((*mask.shape, 3), np.float32)
-        self.paths = SimpleNamespace(table=SimpleNamespace(lower=np.zeros(2), upper=np.ones(2)))
+        self.paths = SimpleNamespace(table=SimpleNamespace(lower=np.zeros(2), upper=np.ones(2), width=np.ones(2)))
 
     def tiles(self, size, most):
         return TileRows.of(self.reference, self.mask, size, most=most)
@@ -125,7 +125,7 @@ def test_values_that_are_kept_stay(blend):
     judge = PictureJudge("flip-hdr", reference, reference.pixels, mask, settings, view, blurred=True)
     residuals = finishing_residuals(settings, Encoding.LINEAR, reference.pixels, mask, view)
     tiles = TracedTiles(TracedPaths(renderer), reference.pixels, mask, None, lambda: False)
-    course = Course(renderer, ("itp", "pu21", "flip"), lambda event: None, lambda: False, 0.0)
+    course = Course(renderer, ("itp", "flip"), lambda event: None, lambda: False, 0.0)
     start = renderer.table.pack({**TRUTH, "base_color": (0.5, 0.45, 0.6)})
     kept = renderer.table.mask_of(["base_color"])
     pictures = LinearPictures(tiles, 1)
@@ -133,7 +133,7 @@ def test_values_that_are_kept_stay(blend):
     end = traced_perception.lower_seen_error(pictures, judge, residuals, start, kept, course, flip=True)
     np.testing.assert_array_equal(end[kept], start[kept])
     assert np.all(end[~kept] != start[~kept])
-    assert [report.name for report in course.reports] == ["itp", "pu21", "flip"]
+    assert [report.name for report in course.reports] == ["itp", "flip"]
     for report in course.reports:
         assert report.loss_best < report.loss_start
 
