@@ -41,7 +41,7 @@ def _argument(number: int) -> Callable[[Any], Any]:
     return lambda original: lambda *given, **named: given[number]
 
 
-def _number(value: float) -> Callable[[Any], Any]:
+def _number(value: Any) -> Callable[[Any], Any]:
     return lambda original: value
 
 
