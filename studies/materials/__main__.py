@@ -1,10 +1,11 @@
 # SPDX-License-Identifier: Apache-2.0
 """Rooms of six unknown materials, fitted together to one picture by Cycles and judged in Cycles: one row for each.
 
-    python -m studies.materials OUT.jsonl --numbers 0-9 --size 96 --preset balanced [--nodes]
+    python -m studies.materials OUT.jsonl --numbers 0-9 --size 96 --preset balanced [--nodes] [--from-truth]
 
-A row has for each material the mean FLIP of Cycles' picture of the fitted room and that of the floor, a second picture
-of the truth: both against the reference, on the pixels that see the material. The goal is a difference of at most 0.01.
+A row has for each material the mean FLIP of Cycles' picture of the fitted room and that of the floor, a mean of four
+other pictures of the truth: all against the reference, on the pixels that see the material. The goal is a difference of
+at most 0.01. With `--from-truth` the file that is fitted has the true values, so a row says what can be reached at all.
 With `--nodes` what is fitted is inside nodes, and a row has the error, deviation and level of each value, too.
 """
 
@@ -48,6 +49,7 @@ def main() -> None:
     parser.add_argument("--size", type=int, default=96, help="pixels along a side")
     parser.add_argument("--preset", default="balanced")
     parser.add_argument("--nodes", action="store_true", help="values inside nodes")
+    parser.add_argument("--from-truth", action="store_true", help="fit the file that has the true values")
     chosen = parser.parse_args()
     first, last = map(int, chosen.numbers.split("-"))
     text = chosen.rows.read_text("utf-8") if chosen.rows.exists() else ""
@@ -56,7 +58,8 @@ def main() -> None:
         if number in {row["number"] for row in rows}:
             continue
         with tempfile.TemporaryDirectory() as folder:
-            rows.append(measure(number, Path(folder), chosen.size, chosen.preset, nodes=chosen.nodes))
+            how = {"nodes": chosen.nodes, "from_truth": chosen.from_truth}
+            rows.append(measure(number, Path(folder), chosen.size, chosen.preset, **how))
         with chosen.rows.open("a", encoding="utf-8") as file:
             file.write(json.dumps(rows[-1]) + "\n")
     print(summary(rows))
