@@ -88,5 +88,8 @@ def _sentence(named: Sequence[str], count: int) -> str:
     if len(named) == 1:
         return f"Picture {named[0]} does not go with the rest: its light or camera differs from its scene. {cure}"
     rest = "" if len(named) == count else " with the rest"
-    wrong = "the light or camera of one of them differs from its scene"
-    return f"Pictures {listed(named)} do not go together{rest}: {wrong}. {cure}"
+    all_of_them = listed(named)
+    return (
+        f"Pictures {all_of_them} do not go together{rest}: the light or camera of one of them differs from its scene. "
+        f"{cure}"
+    )

@@ -13,10 +13,10 @@ from functools import cached_property
 import drjit as dr
 import mitsuba as mi
 
-# Of the samples, for a coat. A coat's bump was 0.79 % too dark without and 0.36 % with it (96 x 96,
+# Of the samples, about the normal of a coat. A coat's bump was 0.79 % too dark without and 0.36 % with it (96 x 96,
 # docs/notebook/graph_values.md); other shares were not tried. Larger: what is below the coat has more noise.
 COAT_SHARE = 0.2
-LEAST_ROUGHNESS, ROUGH_COAT = 0.03, 0.1  # of a lobe, and of a coat's where nodes give it. No measurement
+LEAST_COAT, ROUGH_COAT = 0.03, 0.1  # roughness: the least of `around`, and where nodes give it. No measurement
 
 
 @dataclass(frozen=True)
@@ -30,8 +30,8 @@ class DefensiveProposal:
     view, and the mean of a few recordings was 0.8 % too dark.
     """
 
-    roughness: tuple[float, float, float, float, float] = (0.1, 0.25, 0.5, 1.0, 1.0)
-    share: tuple[float, float, float, float, float] = (0.25, 0.25, 0.2, 0.0, 0.0)
+    roughness: tuple[float, float, float, float] = (0.1, 0.25, 0.5, 1.0)
+    share: tuple[float, float, float, float] = (0.25, 0.25, 0.2, 0.0)
     coat_roughness: float | None = None
 
     @property
@@ -40,14 +40,10 @@ class DefensiveProposal:
         return 1.0 - sum(self.share)
 
     @staticmethod
-    def around(roughness: float, coat: float | None = None) -> DefensiveProposal:
-        """A proposal for a material whose main lobe has this roughness, under a coat of that one if it has any."""
-        narrow, of_coat = (min(max(width, LEAST_ROUGHNESS), 1.0) for width in (roughness, coat or 1.0))
-        own, wider, sharp, wide = (part * (1.0 - COAT_SHARE * (coat is not None)) for part in (0.45, 0.15, 0.05, 0.1))
-        return DefensiveProposal(
-            (narrow, min(2.0 * narrow, 1.0), 0.1, 0.5, of_coat),
-            (own, wider, sharp, wide, 0.0 if coat is None else COAT_SHARE),
-        )
+    def around(roughness: float) -> DefensiveProposal:
+        """A proposal for a material whose main lobe has this roughness."""
+        narrow = min(max(roughness, 0.03), 1.0)
+        return DefensiveProposal((narrow, min(2.0 * narrow, 1.0), 0.1, 0.5), (0.45, 0.15, 0.05, 0.1))
 
     def with_coat(self, roughness: object) -> DefensiveProposal:
         """The same with a lobe for a coat of this roughness, a number unless nodes give it."""
@@ -64,7 +60,7 @@ class DefensiveProposal:
     @property
     def _of_coat(self) -> mi.MicrofacetDistribution:
         assert self.coat_roughness is not None
-        alpha = dr.opaque(mi.Float, max(self.coat_roughness, LEAST_ROUGHNESS) ** 2)
+        alpha = dr.opaque(mi.Float, max(self.coat_roughness, LEAST_COAT) ** 2)
         return mi.MicrofacetDistribution(mi.MicrofacetType.GGX, alpha, True)
 
     def sample(self, wi: mi.Vector3f, lobe: mi.Float, u: mi.Point2f, coat: mi.Vector3f | None = None) -> mi.Vector3f:

@@ -356,21 +356,9 @@ class RecordedScene:
     def _proposal(self, vector: NDArray[np.float64], *, near: bool) -> DefensiveProposal:
         """The density of directions for the material `vector`, or for any; a coat's lobe is sharp wherever it is."""
         width = self._width(vector) if near else None
+        proposal = DefensiveProposal() if width is None else DefensiveProposal.around(width)
         is_turned = self._bumped and "coat_normal" in self.renderer.shape.bsdf().directions
-        coat = None if is_turned else self._coat(vector)
-        proposal = DefensiveProposal() if width is None else DefensiveProposal.around(width, coat)
         return proposal.with_coat(self._value(vector, "coat_roughness")) if is_turned else proposal
-
-    def _coat(self, vector: NDArray[np.float64]) -> float | None:
-        """The roughness of the coat that the material `vector` has; None without one, or where nodes give it.
-
-        The user's where that is sharper: values go back to it, and no wider lobe meets what a sharp coat mirrors.
-        """
-        weight = self._value(vector, "coat_weight")
-        found, user = (self._value(x, "coat_roughness") for x in (vector, self.renderer.start))
-        if not (isinstance(weight, float) and isinstance(found, float) and isinstance(user, float)):
-            return None
-        return min(found, user) if weight > 0.0 else None
 
     def _width(self, vector: NDArray[np.float64]) -> float | None:
         """The narrowest of the main lobes' widths; None where textures give all of them."""

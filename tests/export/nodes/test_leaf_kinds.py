@@ -18,7 +18,8 @@ METALLIC = "ShaderNodeBsdfMetallic"
 @pytest.fixture
 def tree() -> Iterator[Any]:
     material = bpy.data.materials.new("Leaves")
-    material.use_nodes = True
+    if material.node_tree is None:
+        material.use_nodes = True
     yield material.node_tree
     bpy.data.materials.remove(material)
 

@@ -14,12 +14,7 @@ load_variant()
 
 from mfo_backend.render.paths.proposal import DefensiveProposal  # noqa: E402  after the variant is set
 
-PROPOSALS = {
-    "any": DefensiveProposal(),
-    "sharp": DefensiveProposal.around(0.1),
-    "rough": DefensiveProposal.around(0.9),
-    "coated": DefensiveProposal.around(0.5, 0.03),
-}
+PROPOSALS = {"any": DefensiveProposal(), "sharp": DefensiveProposal.around(0.1), "rough": DefensiveProposal.around(0.9)}
 
 
 @pytest.mark.parametrize("name", PROPOSALS)
