@@ -5,6 +5,7 @@
 # Blender reads properties from annotations
 
 import json
+from collections.abc import Sequence
 
 import bpy
 from bpy.props import IntProperty, StringProperty
@@ -77,12 +78,7 @@ class MFO_OT_render_reference(bpy.types.Operator):
 
     def execute(self, context: bpy.types.Context) -> set[str]:
         """Start it; wait for it in background mode."""
-        try:
-            cycles_check.render_reference(new_job_folder(context, "reference") / "reference.exr")
-        except OSError as error:
-            self.report({"ERROR"}, translated(str(error)))
-            return {"CANCELLED"}
-        return _wait_in_background(self, context)
+        return _render(self, context, 1, ())
 
 
 class MFO_OT_render_picture(bpy.types.Operator):
@@ -139,14 +135,7 @@ class MFO_OT_render_picture(bpy.types.Operator):
         setup = {name: getattr(value, "name", value) for name, value in given.items() if value is not None}
         target = {"object": fitted.object.name, "slot": fitted.slot + 1}
         words = ["--target", json.dumps(target), "--picture", json.dumps(setup), "--material", self.material]
-        number = self.index + 2
-        try:
-            out = new_job_folder(context, "reference") / f"picture_{number}.exr"
-            cycles_check.render_reference(out, number, words)
-        except OSError as error:
-            self.report({"ERROR"}, translated(str(error)))
-            return {"CANCELLED"}
-        return _wait_in_background(self, context)
+        return _render(self, context, self.index + 2, words)
 
 
 class MFO_OT_cancel_cycles(bpy.types.Operator):
@@ -179,6 +168,16 @@ def _fitted(context: bpy.types.Context) -> FittedSlot | None:
         return ticked[0] if len(ticked) == 1 else None
     slot = FittedSlot.active(context.object) if context.object is not None else None
     return slot if slot is not None and slot.material is not None else None
+
+
+def _render(operator: bpy.types.Operator, context: bpy.types.Context, number: int, words: Sequence[str]) -> set[str]:
+    """Start the render of a picture of the list, counted from 1; wait for it in background mode."""
+    try:
+        cycles_check.render_reference(new_job_folder(context, "reference") / "reference.exr", number, words)
+    except OSError as error:
+        operator.report({"ERROR"}, translated(str(error)))
+        return {"CANCELLED"}
+    return _wait_in_background(operator, context)
 
 
 def _wait_in_background(operator: bpy.types.Operator, context: bpy.types.Context) -> set[str]:

@@ -93,6 +93,7 @@ class ClosureTree:
             kind = {"VALUE": "NodeSocketFloat", "INT": "NodeSocketFloat", "BOOLEAN": "NodeSocketFloat",
                     "VECTOR": "NodeSocketVector"}.get(socket.type, "NodeSocketColor")  # fmt: skip
             made = tree.interface.new_socket("material_fit", in_out="OUTPUT", socket_type=kind)
+            group.node_tree = tree  # in a tree that no material has it does not follow the interface by itself
             tree.links.new(socket, _by_identifier(output.inputs, made.identifier))
             socket = _by_identifier(group.outputs, made.identifier)
         return socket

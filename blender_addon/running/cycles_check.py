@@ -82,7 +82,7 @@ def check_result(job: Path, material: str, python: Path) -> None:
     _begin(folder, steps, done)
 
 
-def render_reference(out: Path, number: int = 1, words: Sequence[str] = ()) -> None:
+def render_reference(out: Path, number: int, words: Sequence[str]) -> None:
     """Render the scene in Cycles into the scene-linear EXR `out` and make it the reference.
 
     `number` counts the pictures of the list from 1. `words` are further options of the command `render` of

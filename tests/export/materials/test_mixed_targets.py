@@ -78,6 +78,18 @@ def add(first: Build, second: Build) -> Build:
     return build
 
 
+def in_group(build: Build) -> Build:
+    def put(tree: Any) -> Any:
+        group = bpy.data.node_groups.new("Inner", "ShaderNodeTree")
+        group.interface.new_socket("Shader", in_out="OUTPUT", socket_type="NodeSocketShader")
+        group.links.new(build(group), group.nodes.new("NodeGroupOutput").inputs[0])
+        node = tree.nodes.new("ShaderNodeGroup")
+        node.node_tree = group
+        return node.outputs[0]
+
+    return put
+
+
 def material_of(build: Build) -> Any:
     material = new_material("Target")
     tree = material.node_tree
@@ -113,6 +125,8 @@ CASES = {
     "sheen": SHEEN,
     "diffuse under a fresnel": mix(fresnel, DIFFUSE, GLOSSY),
     "two by a mask": mix(noise, PLASTIC, METAL),
+    "two by a mask in a group": in_group(mix(noise, PLASTIC, METAL)),
+    "two by masks, the inner ones in groups": in_group(mix(noise, DIFFUSE, in_group(mix(noise, PLASTIC, METAL)))),
     "a constant mix": mix(0.3, PLASTIC, DIFFUSE),
     "beyond the ends": mix(1.7, DIFFUSE, GLOSSY),
     "half black": mix(0.4, DIFFUSE, None),
