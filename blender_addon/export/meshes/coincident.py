@@ -43,15 +43,20 @@ def most_around(points: NDArray[np.float64], reach: NDArray[np.float64], mesh: T
     low, high = points.min(axis=0) - margin, points.max(axis=0) + margin
     if (mesh.positions.min(axis=0) > high).any() or (mesh.positions.max(axis=0) < low).any():
         return 0
-    corners = mesh.positions[mesh.triangles]
-    lowest, highest = corners.min(axis=1), corners.max(axis=1)
-    near = np.flatnonzero((lowest <= high).all(axis=1) & (highest >= low).all(axis=1))
-    corners, lowest, highest = corners[near].astype(np.float64), lowest[near], highest[near]
+    near = mesh.triangles
+    for axis in range(3):  # one after the other: of a million triangles that takes a tenth of the time
+        values = mesh.positions[:, axis][near]
+        near = near[(values.min(axis=1) <= high[axis]) & (values.max(axis=1) >= low[axis])]
+    corners = mesh.positions[near]
+    lowest, highest = (np.ascontiguousarray(ends.T) for ends in (corners.min(axis=1), corners.max(axis=1)))
     most = 0
     for point, own in zip(points, reach, strict=True):
-        around = (lowest <= point + own).all(axis=1) & (highest >= point - own).all(axis=1)
-        if around.any():
-            most = max(most, _count_around(corners[around], point, own))
+        around = np.flatnonzero((lowest[0] <= point[0] + own) & (highest[0] >= point[0] - own))
+        for axis in (1, 2):
+            at, to = lowest[axis][around], highest[axis][around]
+            around = around[(at <= point[axis] + own) & (to >= point[axis] - own)]
+        if len(around):
+            most = max(most, _count_around(corners[around].astype(np.float64), point, own))
     return most
 
 
