@@ -78,8 +78,6 @@ def _is_default(value: GraphValue | MixValue, target: TargetShader, *, all_leave
 
 def why_no_mix_values(target: TargetShader) -> str | None:
     """What keeps values of a mix from being fitted beside the chosen leaf, as the end of a sentence."""
-    if target.displacement is not None:
-        return "its Displacement has a link"
     for leaf in (target.leaf, *target.others):
         if shines(leaf.node):
             continue
@@ -182,11 +180,8 @@ def _has_free_color(leaf: ClosureLeaf) -> bool:
 
 
 def _not_plain(leaf: ClosureLeaf) -> str | None:
-    """What of a leaf is more than reflection about the normals of the mesh."""
+    """What of a leaf is more than reflection."""
     node = leaf.node
-    for name in DIRECTIONS:
-        if name in node.inputs and node.inputs[name].is_linked:
-            return f"nodes give the {name}"
     if node.bl_idname == PRINCIPLED:
         for name, opaque in OPAQUE.items():
             socket = inputs_of(node).get(name)

@@ -132,10 +132,14 @@ def _factors_of(leaf: ClosureLeaf) -> list[SocketPlace]:
 
 
 def _held(target: TargetShader) -> Iterator[SocketPlace]:
-    """What no value that is fitted may reach: displacement, and a mix's shaders of which the fit holds a picture."""
+    """What no value that is fitted may reach: displacement, a mix's normals, and its shaders of which the fit holds a
+    picture."""
     displacement = target.displacement
     if displacement is not None:
         yield SocketPlace(displacement, ())
+    for leaf in (target.leaf, *target.others) if target.is_mixed else ():
+        directions = (leaf.node.inputs.get(name) for name in DIRECTIONS)
+        yield from (SocketPlace(socket, leaf.groups) for socket in directions if socket is not None)
     for leaf in target.others:
         if leaf.node.bl_idname not in KINDS:
             yield from (SocketPlace(socket, leaf.groups) for socket in leaf.node.inputs)

@@ -14,7 +14,7 @@ from .arrays.grid_table import loaded_buffers
 from .cycles_model import CyclesModel
 from .mitsuba_principled import MitsubaPrincipled
 from .principled.blender_principled import BLENDER_5_0, blender_principled, evaluate
-from .principled.bumped_normals import BUMPED_NORMALS
+from .principled.bumped_normals import BUMPED_NORMALS, LEAF_NORMALS, turned_to_leaf
 from .principled.layers import layer_stack
 from .principled.mix_values import MixValues, amount_of
 from .principled.needed_lobes import needed_lobes
@@ -23,7 +23,7 @@ from .principled.random_walk import WALK
 
 # (values by name, wi, wo) -> BSDF times cosine; directions in the shading frame, a value of exactly 0.0 is a lobe left
 # out
-NO_WALK = ParameterTable(())
+NO_WALK = NO_NORMALS = ParameterTable(())
 Evaluate = Callable[[Mapping[str, Any], Any, Any], Any]
 
 
@@ -33,7 +33,7 @@ class RecordedModel(Protocol):
     Attributes
     ----------
     normals
-        Directions that the functions take besides, where nodes give the surface normals.
+        Directions that the functions take besides, if nodes give the surface normals.
     walks
         Numbers of walks below the surface that they take besides, if they take such lanes.
     scanned
@@ -79,15 +79,16 @@ class BlenderPrincipledModel:
 
     name: str = "blender_principled"
     table: ParameterTable = BLENDER_PRINCIPLED
-    normals: ParameterTable = BUMPED_NORMALS
+    normals: ParameterTable = NO_NORMALS
     walks: ParameterTable = NO_WALK
     scanned: tuple[str, ...] = ("roughness", "coat_roughness")
     two_sided: bool = True
     limited_width: bool = True
     widths: tuple[str, ...] = ("roughness",)
 
-    def __init__(self, cycles: CyclesModel = BLENDER_5_0) -> None:
+    def __init__(self, cycles: CyclesModel = BLENDER_5_0, *, bumped: bool = False) -> None:
         self._cycles = cycles
+        self.normals = BUMPED_NORMALS if bumped else NO_NORMALS
 
     def values(self, given: Mapping[str, Value | None], free: Collection[str]) -> dict[str, Value | None]:
         """See `RecordedModel`."""
@@ -113,8 +114,8 @@ class InnerLightModel(BlenderPrincipledModel):
     the surface, a lane whose walk has a length is of that.
     """
 
-    def __init__(self, cycles: CyclesModel = BLENDER_5_0, *, glows: bool, walks: bool) -> None:
-        super().__init__(cycles)
+    def __init__(self, cycles: CyclesModel = BLENDER_5_0, *, bumped: bool, glows: bool, walks: bool) -> None:
+        super().__init__(cycles, bumped=bumped)
         self._glows = glows
         self.walks = WALK if walks else NO_WALK
 
@@ -143,11 +144,11 @@ class MixedModel(BlenderPrincipledModel):
 
     The values of the fitted leaf have the names of a plain material, free ones of others what a user calls them, and
     what else leaf k has is "leaf_k.base_color" and so on. A leaf's "weight" is what it has without the factors. Light
-    may walk below one of them, as in `InnerLightModel`.
+    may walk below one of them, as in `InnerLightModel`. Directions are in the frame of the fitted leaf's microfacets.
     """
 
     def __init__(self, tree: Any, mix: MixValues) -> None:
-        super().__init__(tree.model)
+        super().__init__(tree.model, bumped=bool(tree.directions))
         self._tree, self._mix = tree, mix
         self._names = {
             k: {p.name: mix.leaves.get(k, {}).get(p.name, f"leaf_{k}.{p.name}") for p in BLENDER_PRINCIPLED}
@@ -168,6 +169,15 @@ class MixedModel(BlenderPrincipledModel):
         # a fit of factors alone has no width to scan
         self.scanned = (*BlenderPrincipledModel.scanned, *rough)
         self.walks = WALK if tree.has_below and not tree.walks_are_held else NO_WALK
+        self._turned = {
+            k: {p.name: f"leaf_{k}.{p.name}" for p in LEAF_NORMALS}
+            for k, leaf in tree.free_leaves.items()
+            if leaf.material.directions
+        }
+        of_leaves = (
+            replace(LEAF_NORMALS[p], name=shown) for names in self._turned.values() for p, shown in names.items()
+        )
+        self.normals = ParameterTable([*self.normals, *of_leaves])
 
     def values(self, given: Mapping[str, Value | None], free: Collection[str]) -> dict[str, Value | None]:
         """See `RecordedModel`; what the other leaves hold is the plugin's to say."""
@@ -182,23 +192,31 @@ class MixedModel(BlenderPrincipledModel):
     def bind(self, fixed: Mapping[str, Value | None], free: Collection[str]) -> Evaluate:
         """See `RecordedModel`."""
         own = needed_lobes({n: v for n, v in fixed.items() if n in BLENDER_PRINCIPLED.names}, free)
-        leaves = [(self._tree.fitted, {}, "weight", own)]
+        leaves: list[tuple[Any, Mapping[str, str], Mapping[str, str] | None, str, Any]]
+        leaves = [(self._tree.fitted, {}, None, "weight", own)]
+        mesh = {} if self._tree.directions else None  # how a leaf without normals of its own is turned
         for k, names in self._names.items():
             known = {name: fixed[shown] for name, shown in names.items() if shown in fixed}
             lobes = needed_lobes(known, [name for name, shown in names.items() if shown in free])
-            leaves.append((self._tree.held[k], names, f"leaf_{k}.weight", lobes))
+            turned = self._turned.get(k, mesh)
+            leaves.append((self._tree.held[k], names, turned, f"leaf_{k}.weight", lobes))
 
         def seen(parameters: Mapping[str, Any], wi: Any, wo: Any) -> Any:
             factors = [parameters[name] for name in self._mix.factors]
+            smooth = parameters.get("smooth_normal", dr.kind_of(wi)(0, 0, 1))
             lit, inside = [], None
-            for leaf, names, weight, lobes in leaves:
-                of_leaf = {name: parameters[shown] for name, shown in names.items()} or parameters
-                layers = layer_stack(of_leaf, wi, lobes, leaf.material.model)
+            for leaf, names, turned, weight, lobes in leaves:
+                of_leaf, own_wi, own_wo = {name: parameters[shown] for name, shown in names.items()}, wi, wo
+                if turned is not None:
+                    given = {name: parameters[shown] for name, shown in turned.items()}
+                    own_wi, own_wo, normals = turned_to_leaf(given, smooth, wi, wo)
+                    of_leaf |= normals
+                layers = layer_stack(of_leaf or parameters, own_wi, lobes, leaf.material.model)
                 amount = parameters[weight] * amount_of(leaf.ways, factors)
                 if self.walks and leaf is self._tree.walking and layers.below is not None:
                     inside = layers.below.shown(wi, parameters) * amount
                     layers = replace(layers, subsurface=None)
-                lit.append(evaluate(layers, layers.to_frame(wo)) * amount)
+                lit.append(evaluate(layers, layers.to_frame(own_wo)) * amount)
             value = sum(lit[1:], lit[0])
             return value if inside is None else dr.select(dr.dot(wo, wo) > 0, value, inside)
 
@@ -227,6 +245,8 @@ def recorded_model(
     if mix is not None:
         return MixedModel(bsdf, mix)
     if name == "blender_principled":
-        cycles = getattr(bsdf, "model", BLENDER_5_0)
-        return InnerLightModel(cycles, glows=glows, walks=walks) if glows or walks else BlenderPrincipledModel(cycles)
+        cycles, bumped = getattr(bsdf, "model", BLENDER_5_0), bool(getattr(bsdf, "directions", ()))
+        if glows or walks:
+            return InnerLightModel(cycles, bumped=bumped, glows=glows, walks=walks)
+        return BlenderPrincipledModel(cycles, bumped=bumped)
     raise UnrecordableError(f"Material model {name!r} has no recorded-path version.")

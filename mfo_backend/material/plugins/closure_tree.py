@@ -193,13 +193,20 @@ class ClosureTree(mi.BSDF):
         return leaf.weight if own == "weight" else leaf.material.picture_of(own)
 
     def values_at(self, si: mi.SurfaceInteraction3f, active: Any) -> dict[str, Any]:
-        """The fitted material's values at a surface point; where more is free, those of free leaves and weights."""
+        """The fitted material's values at a surface point; where more is free, those of free leaves and weights.
+
+        Directions that nodes give these leaves are those of `normals_at`, in the frame of the fitted one's microfacets.
+        """
         values = self.fitted.material.values_at(si, active)
         if not self.is_open:
             return values
         values["weight"] = self.fitted.plain_weight_at(si, active)
+        frame = self.bumped_frame(si, active)[0] if self.directions else si.sh_frame
         for k, leaf in self.free_leaves.items():
             of_leaf = leaf.material.values_at(si, active) | {"weight": leaf.plain_weight_at(si, active)}
+            if leaf.material.directions:
+                given = leaf.material.normals_at(si, active)
+                of_leaf |= {name: mi.Vector3f(frame.to_local(direction)) for name, direction in given.items()}
             values |= {f"leaf_{k}.{name}": value for name, value in of_leaf.items()}
         return values
 

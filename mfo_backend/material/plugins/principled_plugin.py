@@ -5,12 +5,12 @@ Properties are the names of `BLENDER_PRINCIPLED`, each a number, a colour or a n
 further `distribution` ("MULTI_GGX", "GGX"), `blender_version` ("5.0"), `shader` ("principled", or another node of
 `cycles_model.SHADERS`) and `free`: comma-separated names that will
 change after loading, and `subsurface_method`. Lobes whose weight is zero, not textured and not free are not traced;
-changing such a value later brings the lobe back and compiles anew. `unreachable_refraction` (true) is for rough glass:
-false leaves out directions no microfacet leads to, for scenes whose only light Cycles does not sample, a uniform world.
+changing such a value later brings the lobe back and compiles anew.
 `filtered` (false) reads what the integrator `cycles_path` puts where no texture of Mitsuba 3.9 looks: the least alpha
-of the microfacet lobes, for Filter Glossy, from `si.duv_dx.x`, and a 1 from `si.duv_dx.y` where it leaves what is below
-the surface to others; a `closure_tree` of which several let light walk there takes that from them, and they show their
-stand-ins all the same. `mi.traverse` shows
+of the microfacet lobes, for Filter Glossy, from `si.duv_dx.x`, a 1 from `si.duv_dx.y` where it leaves what is below
+the surface to others (a `closure_tree` of which several let light walk there takes that from them, and they show their
+stand-ins all the same), and a 1 from `si.duv_dy.x` for light that Cycles does not sample: directions that no microfacet
+of rough glass leads to do not count there. `mi.traverse` shows
 `<id>.base_color`, `<id>.roughness`, ...; textures as `<id>.<name>.data`. `normal`, `coat_normal` and `tangent` may be
 textures of world directions on the camera's side, zero for the mesh's own.
 
@@ -48,7 +48,7 @@ GIVEN = 0.1  # length of a direction above which there is one
 
 
 @dataclass(frozen=True)
-class _Surface:
+class SurfaceLayers:
     """The layers at a surface point, and their frame in the world where it is not that of the point."""
 
     layers: Layers
@@ -77,7 +77,6 @@ class BlenderPrincipled(mi.BSDF):
         walks = str(props.get("subsurface_method", "RANDOM_WALK"))
         self.model = cycles_model(version, str(props.get("distribution", "MULTI_GGX")), shader, walks)
         self.filtered, self.walks = bool(props.get("filtered", False)), True
-        self.reachable_only = not props.get("unreachable_refraction", True)
         self.free = {name.strip() for name in str(props.get("free", "")).split(",") if name.strip()}
         BLENDER_PRINCIPLED.select(self.free or BLENDER_PRINCIPLED.names)  # refuses unknown names
         self.given = [item.name for item in BLENDER_PRINCIPLED if item.name in props]
@@ -147,7 +146,7 @@ class BlenderPrincipled(mi.BSDF):
         own = {"emission_color": mi.Color3f(1.0), "emission_strength": mi.Float(1.0)}
         if sampled and not self.model.samples_see_layers:
             return mi.Color3f(sampled_emission(self.values_at(si, active) | own, si.wi, self.lobes))
-        return mi.Color3f(self._layers(si, active, **own).layers.emission)
+        return mi.Color3f(self.layers_at(si, active, **own).layers.emission)
 
     @property
     def absorbing(self) -> BlenderPrincipled | None:
@@ -171,7 +170,7 @@ class BlenderPrincipled(mi.BSDF):
 
     def below(self, si: mi.SurfaceInteraction3f, active: Any) -> Below | None:
         """What the view finds below a surface point; None of a material without."""
-        return self._layers(si, active).layers.below
+        return self.layers_at(si, active).layers.below
 
     @property
     def opened(self) -> tuple[str, ...]:
@@ -183,7 +182,7 @@ class BlenderPrincipled(mi.BSDF):
         """What is traced: two materials of one kind differ in the values that are `opened`; None with textures."""
         if self.directions or None in self.fixed.values():
             return None
-        return (self.lobes, self.model, self.filtered, self.walks, self.reachable_only, self.opened)
+        return (self.lobes, self.model, self.filtered, self.walks, self.opened)
 
     @property
     def row(self) -> NDArray[np.float32]:
@@ -212,22 +211,30 @@ class BlenderPrincipled(mi.BSDF):
         """The frame of the microfacet lobes at a surface point, the view in it, and the other normals in it by name."""
         view: Any = si.to_world(si.wi)
         side: Any = dr.mulsign(mi.Float(1), si.wi.z)
-        geometric, smooth = _towards(view, si), self.shading_normal(si, active)
-        bumped = self._turned_to_view("normal", si, smooth, active)
-        coat = valid_normal(geometric, view, self._turned_to_view("coat_normal", si, smooth, active))
-        up = valid_normal(geometric, view, bumped)
-        along: Any = mi.Vector3f(si.sh_frame.s)
-        if "tangent" in self.directions:
-            given = mi.Vector3f(self.directions["tangent"].eval(si, active))
-            along = dr.select(dr.norm(given) > GIVEN, dr.normalize(given), along)
-        n = up * side
+        smooth = self.shading_normal(si, active)
+        given = self.normals_at(si, active)
+        n, along = given["normal"] * side, given["tangent"]
         s = dr.normalize(along - n * dr.dot(n, along))
         # a frame turned to the view is left-handed
         own: Any = si.sh_frame
         handed = dr.dot(dr.cross(own.n, own.s), own.t)
         frame = mi.Frame3f(s, dr.mulsign(dr.cross(n, s), handed), n)
-        others = {"smooth_normal": smooth, "bumped_normal": bumped, "coat_normal": coat}
+        others = {"smooth_normal": smooth} | {name: given[name] for name in ("bumped_normal", "coat_normal")}
         return frame, frame.to_local(view), {name: frame.to_local(other) for name, other in others.items()}
+
+    def normals_at(self, si: mi.SurfaceInteraction3f, active: Any) -> dict[str, mi.Vector3f]:
+        """World directions at a surface point, on the side of the view: the `normal` of the microfacet lobes, that of
+        diffuse and sheen (`bumped_normal`) and of the coat, and the `tangent`, in no particular plane."""
+        view: Any = si.to_world(si.wi)
+        geometric, smooth = _towards(view, si), self.shading_normal(si, active)
+        bumped = self._turned_to_view("normal", si, smooth, active)
+        coat = valid_normal(geometric, view, self._turned_to_view("coat_normal", si, smooth, active))
+        along: Any = mi.Vector3f(si.sh_frame.s)
+        if "tangent" in self.directions:
+            given = mi.Vector3f(self.directions["tangent"].eval(si, active))
+            along = dr.select(dr.norm(given) > GIVEN, dr.normalize(given), along)
+        facets = valid_normal(geometric, view, bumped)
+        return {"normal": facets, "bumped_normal": bumped, "coat_normal": coat, "tangent": along}
 
     def shading_normal(self, si: mi.SurfaceInteraction3f, active: Any) -> mi.Vector3f:
         """The mesh's normal on the side of the view, as a displacement by bump has bent it."""
@@ -257,7 +264,8 @@ class BlenderPrincipled(mi.BSDF):
         own = {"geometric_normal": geometric, "own_tangent": mi.Vector3f(si.sh_frame.s)}
         return normals | axes | {name: frame.to_local(direction) for name, direction in own.items()}
 
-    def _layers(self, si: mi.SurfaceInteraction3f, active: Any, **instead: Any) -> _Surface:
+    def layers_at(self, si: mi.SurfaceInteraction3f, active: Any, **instead: Any) -> SurfaceLayers:
+        """The layers at a surface point, with the values `instead` of its own."""
         values, wi, frame = self.values_at(si, active) | instead, si.wi, None
         if self.directions:
             frame, wi, normals = self.bumped_frame(si, active)
@@ -267,36 +275,33 @@ class BlenderPrincipled(mi.BSDF):
             layers = layers.blurred(si.duv_dx.x)
             if layers.subsurface is not None and self.walks:
                 layers = replace(layers, subsurface=layers.subsurface * (1 - si.duv_dx.y))
-        return _Surface(layers, si, frame)
+        return SurfaceLayers(layers, si, frame)
 
     def _choice(self, ctx: mi.BSDFContext, layers: Layers) -> LobeChoice:
         return lobe_choice(layers, with_transparency=self.lobes.alpha)
 
-    def _value(self, layers: Layers, local: Any) -> Any:
-        return mi.Color3f(evaluate(layers, local, reachable_only=self.reachable_only))
-
-    def _density(self, layers: Layers, choice: LobeChoice, local: Any) -> Any:
-        return pdf(layers, choice, local, reachable_only=self.reachable_only)
+    def _reachable_only(self, si: mi.SurfaceInteraction3f) -> Any:
+        return si.duv_dy.x > 0 if self.filtered and self.lobes.transmission else False
 
     def eval(self, ctx: mi.BSDFContext, si: mi.SurfaceInteraction3f, wo: mi.Vector3f, active: Any = True) -> Any:
         """f_r |cos|, RGB."""
-        surface = self._layers(si, active)
-        return dr.select(active, self._value(surface.layers, surface.to_local(wo)), 0)
+        surface, only = self.layers_at(si, active), self._reachable_only(si)
+        value = mi.Color3f(evaluate(surface.layers, surface.to_local(wo), reachable_only=only))
+        return dr.select(active, value, 0)
 
     def pdf(self, ctx: mi.BSDFContext, si: mi.SurfaceInteraction3f, wo: mi.Vector3f, active: Any = True) -> Any:
         """Density of `sample` per solid angle."""
-        surface = self._layers(si, active)
-        layers = surface.layers
-        return dr.select(active, self._density(layers, self._choice(ctx, layers), surface.to_local(wo)), 0)
+        return self.eval_pdf(ctx, si, wo, active)[1]
 
     def eval_pdf(
         self, ctx: mi.BSDFContext, si: mi.SurfaceInteraction3f, wo: mi.Vector3f, active: Any = True, **instead: Any
     ) -> tuple[Any, Any]:
         """`eval` and `pdf`, the layers evaluated once; with the values of another material of this `kind` `instead`."""
-        surface = self._layers(si, active, **instead)
-        layers, local = surface.layers, surface.to_local(wo)
-        density = self._density(layers, self._choice(ctx, layers), local)
-        return dr.select(active, self._value(layers, local), 0), dr.select(active, density, 0)
+        surface = self.layers_at(si, active, **instead)
+        layers, local, only = surface.layers, surface.to_local(wo), self._reachable_only(si)
+        density = pdf(layers, self._choice(ctx, layers), local, reachable_only=only)
+        value = mi.Color3f(evaluate(layers, local, reachable_only=only))
+        return dr.select(active, value, 0), dr.select(active, density, 0)
 
     def sample(
         self,
@@ -311,13 +316,13 @@ class BlenderPrincipled(mi.BSDF):
 
         With the values of another material of this `kind` `instead`.
         """
-        surface = self._layers(si, active, **instead)
+        surface = self.layers_at(si, active, **instead)
         layers = surface.layers
         choice = self._choice(ctx, layers)
         local, lobe, valid = sample(layers, choice, sample1, sample2)
         valid &= active
-        density = self._density(layers, choice, local)
-        weight = self._value(layers, local) / dr.maximum(density, 1e-30)
+        density = pdf(layers, choice, local)
+        weight = mi.Color3f(evaluate(layers, local)) / dr.maximum(density, 1e-30)
         weight = dr.select(density > 0, weight, 0)
         glass = lobe == NAMES.index("glass")
         diffuse = is_diffuse(lobe, self.model.shader)
@@ -345,7 +350,7 @@ class BlenderPrincipled(mi.BSDF):
 
     def passing_chance(self, ctx: mi.BSDFContext, si: mi.SurfaceInteraction3f, active: Any) -> Any:
         """Probability that `sample` goes straight through."""
-        choice = self._choice(ctx, self._layers(si, active).layers)
+        choice = self._choice(ctx, self.layers_at(si, active).layers)
         return choice["transparent"] if self.lobes.alpha else mi.Float(0)
 
     def eval_diffuse_reflectance(self, si: mi.SurfaceInteraction3f, active: Any = True) -> Any:

@@ -44,7 +44,7 @@ def blender_principled(
     return evaluate(layers, layers.to_frame(wo))
 
 
-def evaluate(layers: Layers, wo: Any, *, reachable_only: bool = False) -> Any:
+def evaluate(layers: Layers, wo: Any, *, reachable_only: Any = False) -> Any:
     """f_r |cos| of the stack for light from `wo` in the frame of the layers; `reachable_only` as in `refracted`."""
     if layers.normals is not None:
         return _evaluate_bumped(layers, layers.normals, wo, reachable_only)
@@ -68,7 +68,7 @@ def _turned_over(wo: Any) -> Any:
     return dr.kind_of(wo)(wo.x, wo.y, -wo.z)
 
 
-def _evaluate_bumped(layers: Layers, normals: BumpedNormals, wo: Any, reachable_only: bool) -> Any:
+def _evaluate_bumped(layers: Layers, normals: BumpedNormals, wo: Any, reachable_only: Any) -> Any:
     """The same with a normal for each group of lobes; the layers' frame is that of the microfacets."""
     wi = layers.wi
     own = dr.kind_of(wi)(0, 0, 1)
@@ -154,11 +154,18 @@ def refraction_normal(layers: Layers, wo: Any) -> tuple[Any, Any, Any]:
     return h, dr.square(n) / squared * dr.abs(dr.dot(wo, h)), possible
 
 
-def refracted(layers: Layers, wo: Any, *, reachable_only: bool = False) -> Any:
+def reached(possible: Any, reachable_only: Any) -> Any:
+    """Whether a pair counts that a microfacet may connect, or may not; `reachable_only` as in `refracted`."""
+    if isinstance(reachable_only, bool):
+        return possible | (not reachable_only)
+    return possible | ~reachable_only
+
+
+def refracted(layers: Layers, wo: Any, *, reachable_only: Any = False) -> Any:
     """f_r |cos| of light that comes through the surface from `wo` below it.
 
     Cycles also evaluates pairs that no microfacet can connect, which its own sampling never reaches, so that they count
-    for lights it samples; so does this, unless `reachable_only`.
+    for lights it samples; so does this, unless `reachable_only`, a bool or one for each.
     """
     assert layers.glass_fresnel is not None
     wi, alpha = layers.wi, layers.glass_alpha
@@ -168,7 +175,7 @@ def refracted(layers: Layers, wo: Any, *, reachable_only: bool = False) -> Any:
     lobe = layers.facets.density(h, alpha, alpha) * seen * c * jacobian / dr.maximum(wi.z, 1e-7)
     counted = (wo.z < 0) & (wi.z > 0)
     return dr.select(
-        counted & possible if reachable_only else counted,
+        counted & reached(possible, reachable_only),
         layers.glass * layers.glass_colour * (1 - layers.glass_fresnel(c)) * lobe,
         0,
     )

@@ -21,6 +21,15 @@ from ..arrays import dual as dr
 BUMPED_NORMALS = ParameterTable(
     Parameter(name, 3, -1.0, 1.0, (0.0, 0.0, 1.0)) for name in ("smooth_normal", "bumped_normal", "coat_normal")
 )
+# What nodes give another leaf of a mix, in the frame of the fitted one's microfacets: the normal of its own, those of
+# its diffuse lobes and of its coat, and its tangent
+LEAF_NORMALS = ParameterTable(
+    Parameter(name, 3, -1.0, 1.0, up)
+    for name, up in (
+        *((name, (0.0, 0.0, 1.0)) for name in ("normal", "bumped_normal", "coat_normal")),
+        ("tangent", (1.0, 0.0, 0.0)),
+    )
+)
 # a reflection at a valid normal leaves the mesh's own plane by this cosine, or by a share of the view's
 LEAST_COSINE, SHARE_OF_VIEW = 0.01, 0.9
 TERMINATOR = 0.125  # alpha^2 of the bumps by the squared tangent of the angle between the normals
@@ -80,12 +89,11 @@ def _axes(normal: Any) -> tuple[Any, Any]:
     vector = dr.kind_of(normal)
     # the first axis of the layers' frame, made perpendicular
     x = dr.normalize(vector(1 - normal.x * normal.x, -normal.x * normal.y, -normal.x * normal.z))
-    y = vector(
-        normal.y * x.z - normal.z * x.y,
-        normal.z * x.x - normal.x * x.z,
-        normal.x * x.y - normal.y * x.x,
-    )
-    return x, y
+    return x, _cross(normal, x)
+
+
+def _cross(a: Any, b: Any) -> Any:
+    return dr.kind_of(a)(a.y * b.z - a.z * b.y, a.z * b.x - a.x * b.z, a.x * b.y - a.y * b.x)
 
 
 def valid_normal(geometric: Any, view: Any, normal: Any) -> Any:
@@ -109,6 +117,24 @@ def valid_normal(geometric: Any, view: Any, normal: Any) -> Any:
 
 def _tangent2(cosine: Any) -> Any:
     return dr.maximum(dr.rcp(dr.square(dr.clip(cosine, 1e-6, 1))) - 1, 0)
+
+
+def turned_to_leaf(given: Mapping[str, Any], smooth: Any, wi: Any, wo: Any) -> tuple[Any, Any, dict[str, Any]]:
+    """Directions in the frame of another leaf's microfacets, and those of `BUMPED_NORMALS` in it.
+
+    `given` are its `LEAF_NORMALS`, or empty: a leaf about the mesh's `smooth` normal, which has no others.
+    """
+    if not given:
+        return about(smooth, wi), about(smooth, wo), {}
+    n, along = given["normal"], given["tangent"]
+    s = dr.normalize(along - dr.dot(n, along) * n)
+    t = _cross(n, s)
+
+    def within(v: Any) -> Any:
+        return dr.kind_of(v)(dr.dot(s, v), dr.dot(t, v), dr.dot(n, v))
+
+    others = {"smooth_normal": smooth, "bumped_normal": given["bumped_normal"], "coat_normal": given["coat_normal"]}
+    return within(wi), within(wo), {name: within(other) for name, other in others.items()}
 
 
 def turned_to_normals(
@@ -135,7 +161,6 @@ def turned_to_normals(
     n = valid_normal(geometric, wi, bumped)
     along = direction("tangent", tangent)
     s = dr.normalize(along - dr.dot(n, along) * n)
-    t = vector(n.y * s.z - n.z * s.y, n.z * s.x - n.x * s.z, n.x * s.y - n.y * s.x)
-    frame = (s, t, n)
+    frame = (s, _cross(n, s), n)
     others = {"smooth_normal": smooth, "bumped_normal": bumped, "coat_normal": coat}
     return within(frame, wi), within(frame, wo), {name: within(frame, other) for name, other in others.items()}

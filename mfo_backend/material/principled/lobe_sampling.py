@@ -15,7 +15,7 @@ import drjit as dr
 from ..arrays.clamp import mean
 from ..lobes.fresnel import dielectric
 from ..lobes.microfacet import sample_visible, visible_pdf
-from .blender_principled import refraction_normal
+from .blender_principled import reached, refraction_normal
 from .bumped_normals import about, out_of
 from .layers import Layers
 
@@ -75,7 +75,7 @@ def lobe_choice(layers: Layers, with_transparency: bool, least_diffuse: float = 
     return LobeChoice(probability)
 
 
-def pdf(layers: Layers, choice: LobeChoice, wo: Any, *, reachable_only: bool = False) -> Any:
+def pdf(layers: Layers, choice: LobeChoice, wo: Any, *, reachable_only: Any = False) -> Any:
     """Density per solid angle of `sample` for the smooth lobes, `wo` in the frame of the layers.
 
     As in Cycles, glass has a density also for the pairs no microfacet connects, where its value is not zero either but
@@ -104,8 +104,8 @@ def pdf(layers: Layers, choice: LobeChoice, wo: Any, *, reachable_only: bool = F
         alpha = layers.glass_alpha
         h, jacobian, possible = refraction_normal(layers, wo)
         through = visible_pdf(wi, h, alpha, alpha) * jacobian * (1 - reflect_probability(layers, dr.abs(dr.dot(wi, h))))
-        counted = (wo.z < 0) & (wi.z > 0)
-        density += dr.select(counted & possible if reachable_only else counted, choice["glass"] * through, 0)
+        counted = (wo.z < 0) & (wi.z > 0) & reached(possible, reachable_only)
+        density += dr.select(counted, choice["glass"] * through, 0)
     if choice["translucent"] is not None:
         density += dr.select(wi.z > 0, choice["translucent"] * dr.maximum(-wo.z, 0) / dr.pi, 0)
     return dr.detach(density)

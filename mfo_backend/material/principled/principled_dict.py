@@ -29,7 +29,6 @@ def blender_principled_dict(
     distribution: str = "MULTI_GGX",
     version: Sequence[int] = (5, 0),
     free: Collection[str] = (),
-    unreachable_refraction: bool = True,
     shader: str = "principled",
     subsurface_method: str = "RANDOM_WALK",
 ) -> dict[str, Any]:
@@ -37,8 +36,7 @@ def blender_principled_dict(
 
     A socket with a `texture` becomes a nested bitmap read without colour conversion, one with a `graph` a texture that
     is projected from the camera (`projective_texture`). Sockets at their default are left out unless `free`, so that
-    their lobes stay out of the kernel. `unreachable_refraction` should be False where a uniform world is the only light
-    (see the plugin).
+    their lobes stay out of the kernel.
 
     Raises
     ------
@@ -54,8 +52,6 @@ def blender_principled_dict(
         result["shader"] = shader
     if subsurface_method != "RANDOM_WALK":
         result["subsurface_method"] = subsurface_method
-    if not unreachable_refraction:
-        result["unreachable_refraction"] = False
     if free:
         result["free"] = ",".join(BLENDER_PRINCIPLED.select(free).names)
     for socket, content in sockets.items():
@@ -80,7 +76,7 @@ def blender_principled_dict(
 
 
 def closure_tree_dict(
-    material: Mapping[str, Any], fitted: Mapping[str, Any], *, version: Sequence[int], unreachable_refraction: bool
+    material: Mapping[str, Any], fitted: Mapping[str, Any], *, version: Sequence[int]
 ) -> dict[str, Any]:
     """Properties of the plugin `closure_tree` for a material of request.json whose fitted leaf has those of `fitted`.
 
@@ -98,7 +94,6 @@ def closure_tree_dict(
             distribution=leaf.get("distribution", "MULTI_GGX"),
             version=version,
             free=[PARAMETER_OF_SOCKET[socket] for socket in leaf.get("free", ())],
-            unreachable_refraction=unreachable_refraction,
             shader=leaf["shader"],
             subsurface_method=leaf.get("subsurface_method", "RANDOM_WALK"),
         )

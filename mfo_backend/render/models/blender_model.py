@@ -64,14 +64,12 @@ def prepare_several_blender_principled(
     """
     opened = {target.bsdf_id: _opened(target, selection, materials) for target, selection in targets}
     textures = _textures(scene)
-    # a light Cycles does not sample: directions no microfacet of rough glass leads to do not count there
-    uniform = {emitter.get("type") for emitter in scene.iter("emitter")} == {"constant"}
     for bsdf in scene.findall("bsdf"):
         bsdf_id = bsdf.get("id", "")
         if bsdf_id in materials:
             table = opened[bsdf_id][1] if bsdf_id in opened else None
             start = {} if table is None else table.unpack(opened[bsdf_id][2])
-            _put_material(scene, bsdf, materials[bsdf_id], start, textures, unreachable_refraction=not uniform)
+            _put_material(scene, bsdf, materials[bsdf_id], start, textures)
     _put_normal_maps(scene, materials)
     return [_prepared(scene, *found, materials[bsdf_id]) for bsdf_id, found in opened.items()]
 
@@ -148,8 +146,6 @@ def _put_material(
     material: Mapping[str, Any],
     start: Mapping[str, Value],
     textures: Mapping[str, Element],
-    *,
-    unreachable_refraction: bool,
 ) -> None:
     """Make a BSDF the plugin of a material; what has a `start` is open to change."""
     bsdf_id, version = bsdf.get("id", ""), material.get("blender_version", _VERSION)
@@ -160,14 +156,11 @@ def _put_material(
         distribution=material.get("distribution", "MULTI_GGX"),
         version=version,
         free=free,
-        unreachable_refraction=unreachable_refraction,
         shader=material.get("shader", "principled"),
         subsurface_method=material.get("subsurface_method", "RANDOM_WALK"),
     )
     if is_mixed(material):
-        properties = closure_tree_dict(
-            material, properties, version=version, unreachable_refraction=unreachable_refraction
-        )
+        properties = closure_tree_dict(material, properties, version=version)
     _rewrite(bsdf, properties, textures)
     bsdf.set("id", bsdf_id)
     radiance = leaf_radiance_dict(material, material.get("film_exposure", 1.0))

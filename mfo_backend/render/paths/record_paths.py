@@ -42,7 +42,7 @@ class _Hits:
     """First hits of the camera rays on the target, and the number of `pixels`.
 
     Of a mix there is the `plugin`, and `own` are the hits in the frame of the mesh, which its held materials take.
-    `coat` is the normal that a coat has of its own.
+    `coat` is the normal that a coat has of its own, and `smooth` the mesh's, of a mix whose fitted material has others.
     """
 
     si: Any
@@ -53,13 +53,19 @@ class _Hits:
     plugin: Any = None
     own: Any = None
     coat: Any = None
+    smooth: Any = None
+
+    def lit(self, wo: mi.Vector3f) -> mi.Bool:
+        """Whether light from `wo` reaches the material: that below the plane of its microfacets lights other leaves."""
+        return wo.z > 0.0 if self.smooth is None else dr.dot(self.smooth, wo) > 0.0
 
     def of_rays(self, ray: mi.UInt32) -> _Hits:
         """Those of some rays, which may repeat."""
         si, position, share = (dr.gather(type(a), a, ray) for a in (self.si, self.position, self.share))
-        own, coat = (None if a is None else dr.gather(type(a), a, ray) for a in (self.own, self.coat))
+        given = (self.own, self.coat, self.smooth)
+        own, coat, smooth = (None if a is None else dr.gather(type(a), a, ray) for a in given)
         held = tuple(dr.gather(type(a), a, ray) for a in self.held)
-        return _Hits(si, position, share, held, self.pixels, self.plugin, own, coat)
+        return _Hits(si, position, share, held, self.pixels, self.plugin, own, coat, smooth)
 
 
 def record_paths(
@@ -115,26 +121,26 @@ def record_paths(
         own = mi.SurfaceInteraction3f(si) if settings.mixed else None
         if own is not None and below is not None and not walks_free:
             own.duv_dx = mi.Point2f(0.0, 1.0)  # walks take the place of the lobe that stands for them
-        coat = _coat_normal(shape, settings, si)
+        coat, smooth = _other_normals(shape, settings, si)
         si = _turned(shape, settings, si)
         sampled = settings.depth > 2 or not lights_have_no_extent(scene)
         if settings.depth == 2 or settings.light_paths is None:
             si = _without_parametrisation(si)
         # exact lights alone look at hits once each, and compute them again instead of keeping them
-        dr.eval(si if sampled or settings.mixed else (), own, coat, position, filter_weight, held)
-        pixels = len(rays.pixel)
-        hits = _Hits(si, position, filter_weight, held, pixels, shape.bsdf() if settings.mixed else None, own, coat)
+        dr.eval(si if sampled or settings.mixed else (), own, coat, smooth, position, filter_weight, held)
+        plugin = shape.bsdf() if settings.mixed else None
+        hits = _Hits(si, position, filter_weight, held, len(rays.pixel), plugin, own, coat, smooth)
         exact = [part for part in _delta_lights(scene, hits, shadows) if dr.width(part.position) > 0]
         if radiance is not None:
             nowhere = dr.zeros(mi.Vector3f, dr.width(position))
             exact.append(_lit(hits, nowhere, radiance, mi.Bool(True))())
-        lanes = [replace(e, position=e.position + s * pixels) for s in range(settings.samples) for e in exact]
+        lanes = [replace(e, position=e.position + s * hits.pixels) for s in range(settings.samples) for e in exact]
         if sampled:
             lanes += _sampled_lights(scene, hits, settings, lamps, shadows)
         if below is not None:
             lanes.append(_walks(scene, hits, of_hits, below, settings, free=walks_free))
 
-        covered, coverage = coverage_of(pixels, position, filter_weight)
+        covered, coverage = coverage_of(hits.pixels, position, filter_weight)
         constant = recorded_background(
             scene, (height, width), rays, seen, on_target, covered, lamps, seed=settings.seed + 0x2545F49,
             depth=max(settings.depth, 2), light_paths=settings.light_paths, hide_emitters=settings.hide_emitters,
@@ -211,12 +217,17 @@ def _turned(shape: mi.Shape, settings: RecordSettings, si: mi.SurfaceInteraction
     return si
 
 
-def _coat_normal(shape: mi.Shape, settings: RecordSettings, si: mi.SurfaceInteraction3f) -> mi.Vector3f | None:
-    """The normal that the coat of a bumped material has of its own, in the frame of its microfacets."""
-    if settings.proposal.coat_roughness is None:
-        return None
+def _other_normals(
+    shape: mi.Shape, settings: RecordSettings, si: mi.SurfaceInteraction3f
+) -> tuple[mi.Vector3f | None, mi.Vector3f | None]:
+    """The normal that the coat of a bumped material has of its own, and the mesh's where it is mixed with others, both
+    in the frame of its microfacets."""
+    has_coat, has_others = settings.proposal.coat_roughness is not None, settings.bumped and settings.mixed
+    if not (has_coat or has_others):
+        return None, None
     plugin: Any = shape.bsdf()
-    return plugin.bumped_frame(si, mi.Bool(True))[2]["coat_normal"]
+    normals = plugin.bumped_frame(si, mi.Bool(True))[2]
+    return normals["coat_normal"] if has_coat else None, normals["smooth_normal"] if has_others else None
 
 
 def _delta_lights(scene: mi.Scene, hits: _Hits, shadows: ShadowRays) -> list[TechniqueLanes]:
@@ -228,7 +239,7 @@ def _delta_lights(scene: mi.Scene, hits: _Hits, shadows: ShadowRays) -> list[Tec
             continue
         ds, value = emitter.sample_direction(si, mi.Point2f(0.5))
         wo = si.to_local(ds.d)
-        lit = (ds.pdf > 0.0) & (wo.z > 0.0) & (si.wi.z > 0.0) & (dr.max(value) > 0.0)
+        lit = (ds.pdf > 0.0) & hits.lit(wo) & (si.wi.z > 0.0) & (dr.max(value) > 0.0)
         value *= shadows.left(shadows.passed(si, ds, lit))
         started.append(_lit(hits, wo, value * (hits.share * terminator.bend(si, wo, lit)), lit & (dr.max(value) > 0.0)))
     return [kept() for kept in started]
@@ -269,7 +280,7 @@ def _sampled_lights(
         u = even_points(2, number // len(extended), tile, tiles, settings.seed + 0x51ED270)
         ds, value = emitter.sample_direction(si, mi.Point2f(*u), front)
         wo = si.to_local(ds.d)
-        lit = front & (ds.pdf > 0.0) & (wo.z > 0.0) & (dr.max(value) > 0.0)
+        lit = front & (ds.pdf > 0.0) & hits.lit(wo) & (dr.max(value) > 0.0)
         passed = shadows.passed(si, ds, lit)
         value *= shadows.left(passed)
         lit &= dr.max(value) > 0.0

@@ -108,9 +108,7 @@ class RecordedScene:
         self.model = recorded_model(renderer.model, bsdf, renderer.mix, glows=self._glows, walks=walks)
         self._fixed = self.model.values(values_in_scene(renderer.shape.bsdf(), self.model), renderer.table.names)
         self._bumped = bool(getattr(renderer.shape.bsdf(), "directions", ()))
-        if self._bumped:
-            self._fixed |= dict.fromkeys(self.model.normals.names)
-        self._fixed |= dict.fromkeys(self.model.walks.names)
+        self._fixed |= dict.fromkeys((*self.model.normals.names, *self.model.walks.names))
         self.graph = graph or renderer.graph
         varying = partial(VaryingValues, table=renderer.table, sizes=self.model.table)
         self._varying, self._evaluated = (each and varying(each) for each in (renderer.graph, self.graph))

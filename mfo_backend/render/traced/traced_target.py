@@ -18,7 +18,6 @@ import mitsuba as mi
 from ...material.plugins.closure_tree import ClosureTree
 from ...material.plugins.principled_plugin import BlenderPrincipled
 from ...material.principled.blender_principled import evaluate
-from ...material.principled.layers import layer_stack
 from ...material.principled.lobe_sampling import NAMES, is_diffuse, lobe_choice, pdf, sample
 from ...types.errors import UnrecordableError
 from ..models.prepared_material import EMISSION
@@ -82,34 +81,33 @@ class TracedTarget:
         moved = zip(slopes[DENSITY], slopes[COLOR], strict=True)
         return [coefficient(*values.values()), *(a * rest - b * density for a, b in moved)]
 
-    def at(self, si, wo, u1, u2, met, on, theta, offset, directions) -> Scattering:
+    def at(self, si, wo, u1, u2, met, on, theta, offset, directions, unsampled=False) -> Scattering:
         """What it does with light from `wo`, and in a direction drawn by `u1` and `u2`, where paths go `on`; its own
-        light wherever they have `met` it. The vector of a path begins at its `offset` in `theta`."""
+        light wherever they have `met` it. The vector of a path begins at its `offset` in `theta`. `unsampled` says
+        where light from `wo` is such as Cycles does not sample."""
         plugin = self.plugin
         entries = [dr.gather(mi.Float, theta, offset + k, met) for k in range(self.table.length)]
         if directions:
             dr.enable_grad(*entries)
-        parameters: dict[str, Any] = plugin.values_at(si, met)
+        parameters: dict[str, Any] = {}
         if self.glow is not None:
             parameters |= {EMISSION: mi.Color3f(1.0), "emission_strength": mi.Float(1.0)}
         iterator = iter(entries)
         for p in self.table:
             parameters[p.name] = next(iterator) if p.size == 1 else mi.Color3f(*(next(iterator) for _ in range(3)))
-        layers = layer_stack(parameters, si.wi, plugin.lobes, plugin.model)
-        if plugin.filtered:
-            layers = layers.blurred(si.duv_dx.x)
+        surface = plugin.layers_at(si, met, **parameters)
+        layers = surface.layers
         choice = lobe_choice(layers, with_transparency=plugin.lobes.alpha, least_diffuse=LEAST_DIFFUSE)
-        only = plugin.reachable_only
         mixture = None if self.tree is None else self.tree.mixture(si, u1, u2, on)
         drawn, lobe, valid = sample(layers, choice, u1 if mixture is None else mixture.u1, u2)
         if mixture is not None:
-            drawn = dr.select(mixture.is_held, layers.to_frame(mixture.drawn.wo), drawn)
+            drawn = dr.select(mixture.is_held, surface.to_local(mixture.drawn.wo), drawn)
             valid = dr.select(mixture.is_held, mixture.drawn.pdf > 0.0, valid)
-        towards = dr.detach(layers.to_frame(wo))
-        f_light = mi.Color3f(evaluate(layers, towards, reachable_only=only))
-        pdf_light = dr.detach(pdf(layers, choice, towards, reachable_only=only))
-        f_next = mi.Color3f(evaluate(layers, drawn, reachable_only=only))
-        pdf_next = dr.detach(pdf(layers, choice, drawn, reachable_only=only))
+        towards = dr.detach(surface.to_local(wo))
+        f_light = mi.Color3f(evaluate(layers, towards, reachable_only=unsampled))
+        pdf_light = dr.detach(pdf(layers, choice, towards, reachable_only=unsampled))
+        f_next = mi.Color3f(evaluate(layers, drawn))
+        pdf_next = dr.detach(pdf(layers, choice, drawn))
         diffuse = is_diffuse(lobe, plugin.model.shader)
         kind = dr.select(diffuse, mi.UInt32(+mi.BSDFFlags.DiffuseReflection), mi.UInt32(+mi.BSDFFlags.GlossyReflection))
         through = (lobe == NAMES.index("glass")) & (drawn.z < 0.0)
@@ -123,7 +121,7 @@ class TracedTarget:
             value, density = mixture.held(wo)
             f_light = mixture.weight * f_light + value
             pdf_light = mixture.chance * pdf_light + density
-            value, density = mixture.held(dr.detach(layers.from_frame(drawn)))
+            value, density = mixture.held(dr.detach(surface.from_local(drawn)))
             f_next = mixture.weight * f_next + value
             pdf_next = mixture.chance * pdf_next + density
             kind = dr.select(mixture.is_held, mixture.drawn.sampled_type, kind)
@@ -151,5 +149,5 @@ class TracedTarget:
                 dr.clear_grad(result)
         light, following = ([dr.select(on, c, 0.0) for c in column] for column in columns[:2])
         glow = columns[2] if self.glow is not None else []
-        drawn = dr.detach(layers.from_frame(drawn))
+        drawn = dr.detach(surface.from_local(drawn))
         return Scattering(light, pdf_light, following, pdf_next, drawn, kind, glow)

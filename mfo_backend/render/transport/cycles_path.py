@@ -25,7 +25,7 @@ from ...types.light_paths import NO_LIMIT, TRANSPARENT_BOUNCES, LightPaths
 from ..lamps.met_lamps import SceneLamps, alone
 from .absorption import Inside
 from .camera_view import CameraView
-from .shadow_rays import ShadowRays, sample_light
+from .shadow_rays import ShadowRays, is_unsampled, sample_light
 from .smooth_facets import leaves_on, met_light, seen_side
 
 PLUGIN_NAME = "cycles_path"
@@ -154,6 +154,7 @@ class CyclesPath(RBIntegrator):
                 direct = direct * clamp_factor(self.clamp_indirect, first * direct, bounce >= 1)
             else:
                 ds, light, _, ways = sample_light(scene, shadows, si, on_light, scatters, None, passages, inside)
+                si.duv_dy = mi.Point2f(dr.select(is_unsampled(ds), 1, 0), 0)
                 lit = scatters & (ds.pdf > 0) & mi.has_flag(bsdf.flags(), mi.BSDFFlags.Smooth)
                 if dr.hint(terminator.bends, mode="scalar"):
                     light *= terminator.bend(si, si.to_local(ds.d), lit)

@@ -167,6 +167,13 @@ def sample_light(
     return ds, light * passed.through, passed.times, passed.lengths
 
 
+def is_unsampled(ds: mi.DirectionSample3f) -> mi.Bool:
+    """Whether light is that of a uniform world, which Cycles leaves to the directions that materials draw."""
+    flags = ds.emitter.flags()
+    varies = mi.has_flag(flags, mi.EmitterFlags.SpatiallyVarying)
+    return mi.has_flag(flags, mi.EmitterFlags.Infinite) & ~varies & ~ds.delta
+
+
 def left_of(alpha: mi.Float | None, times: mi.UInt32) -> tuple[mi.Float | float, mi.Float | float]:
     """What a surface leaves of light that goes through it so many times, and the derivative by its alpha.
 

@@ -13,7 +13,6 @@ bpy = pytest.importorskip("bpy")
 
 from blender_addon.export.nodes.displacement import bends_normals, moves_faces  # noqa: E402
 from blender_addon.export.nodes.target_shader import target_shader  # noqa: E402
-from blender_addon.graph_values.mix_values import why_no_mix_values  # noqa: E402
 from blender_addon.graph_values.table import graph_values  # noqa: E402
 
 from ..scenes import new_material  # noqa: E402
@@ -194,17 +193,15 @@ def test_a_normal_map_above_a_displacement_is_that_of_cycles(
 
 
 def test_values_that_displace_are_held(scene: Any) -> None:
-    """A noise scale that feeds the colour alone is free, one that moves the surface is not; nor are values of a mix."""
+    """A noise scale that feeds the colour alone is free, one that moves the surface is not."""
     material = new_material("Target")
     tree, shader = material.node_tree, principled(material)
     tree.links.new(noise(material, 3.0), shader.inputs["Roughness"])
     target = target_shader(material)
     assert target is not None
     assert "Noise Texture/Scale" in [value.name for value in graph_values(target)]
-    assert why_no_mix_values(target) is None
     displace(material, shader.inputs["Roughness"].links[0].from_socket, 0.1, "BUMP")
     assert "Noise Texture/Scale" not in [value.name for value in graph_values(target)]
-    assert why_no_mix_values(target) == "its Displacement has a link"
 
 
 def test_a_displacement_that_cannot_be_evaluated_is_refused(scene: Any, export: Any, tmp_path: Path) -> None:

@@ -90,6 +90,22 @@ def in_group(build: Build) -> Build:
     return put
 
 
+def bumped(build: Build, scale: float, socket: str = "Normal", strength: float = 1.0) -> Build:
+    """The shader with a bump of noise on one of its normals."""
+
+    def build_with_bump(tree: Any) -> Any:
+        surface = build(tree)
+        height, bump = tree.nodes.new("ShaderNodeTexNoise"), tree.nodes.new("ShaderNodeBump")
+        height.inputs["Scale"].default_value = scale
+        bump.inputs["Strength"].default_value, bump.inputs["Distance"].default_value = strength, 0.3
+        tree.links.new(coordinates(tree), height.inputs["Vector"])
+        tree.links.new(height.outputs[0], bump.inputs["Height"])
+        tree.links.new(bump.outputs[0], surface.node.inputs[socket])
+        return surface
+
+    return build_with_bump
+
+
 def material_of(build: Build) -> Any:
     material = new_material("Target")
     tree = material.node_tree
@@ -132,6 +148,7 @@ CASES = {
     "half black": mix(0.4, DIFFUSE, None),
     "added": add(DIFFUSE, shader("BsdfAnisotropic", Color=(0.2, 0.2, 0.2), Roughness=0.3)),
     "a colour that shines": mix(0.4, DIFFUSE, occlusion),
+    "a bumped one and a plain one": mix(0.6, bumped(DIFFUSE, 4.0), GLOSSY),
     "three and a glow": add(mix(noise, DIFFUSE, mix(0.5, GLOSSY, SHEEN)), mix(noise, GLOW, None)),
 }
 
@@ -175,6 +192,9 @@ def cut_by_noise(tree: Any) -> Any:
     return surface
 
 
+COATED_GLASS = shader(
+    "BsdfPrincipled", Base_Color=GOLD, Roughness=0.5, Transmission_Weight=0.5, Coat_Weight=1.0, Coat_Roughness=0.3
+)
 CLEAR = shader("BsdfTransparent", Color=(0.9, 0.9, 0.9))
 CASES_OF_PATHS = {
     "glass": shader("BsdfGlass", Color=GOLD, Roughness=0.3),
@@ -184,6 +204,15 @@ CASES_OF_PATHS = {
     "holes": mix(noise, PLASTIC, CLEAR),
     "holes by alpha": cut_by_noise,
     "two glasses": mix(noise, shader("BsdfGlass", Color=RED), shader("BsdfGlass", Color=BLUE)),
+}
+
+
+BUMPED_PATHS = {
+    "rough glass": shader("BsdfGlass", Color=GOLD, Roughness=0.5),
+    "glass": bumped(shader("BsdfGlass", Color=GOLD, Roughness=0.5), 3.0),
+    "holes": bumped(cut_by_noise, 3.0),
+    "translucent": mix(0.5, bumped(DIFFUSE, 3.0), shader("BsdfTranslucent", Color=GOLD)),
+    "a coat": bumped(COATED_GLASS, 3.0, "Coat Normal"),
 }
 
 
@@ -227,6 +256,28 @@ def test_pictures_of_whole_paths_are_cycles(
         rms = np.sqrt(np.mean((shown - truth[mask]) ** 2)) / truth[mask].mean()
         assert abs(level) < 0.01
         assert rms < 0.08
+
+
+@pytest.mark.parametrize("name", BUMPED_PATHS)
+def test_whole_paths_see_what_bends_the_normals(
+    scene: Any, export: Any, render_cycles: Any, mitsuba: Any, name: str
+) -> None:
+    """The fit's own paths, in a sun and a plain sky, which Cycles samples in other ways: one counts more through rough
+    glass. With the mesh's normals they are off by 1 to 4 % in level, and by 5 to 11 % in a pixel."""
+    from mfo_backend.render.traced.traced_paths import TracedPaths
+
+    from ..scenes import add_light
+
+    lit_by_the_sky(scene)
+    add_light("SUN", rotation=(0.9, 0.3, 0.0), energy=4.0, angle=0.2)
+    found, truth = renderer_and_cycles(export, render_cycles, ball(material_of(BUMPED_PATHS[name])))
+    mask = found.target_mask()
+    shown = TracedPaths(found).images(
+        np.asarray(found.start), np.flatnonzero(mask), seed=0, samples=2048, jacobian=False
+    )[0, :, :, 0]
+    assert abs(shown.mean() / truth[mask].mean() - 1.0) < 0.004
+    rms = np.sqrt(np.mean((shown - truth[mask]) ** 2)) / truth[mask].mean()
+    assert rms < (0.08 if "glass" in name else 0.04)  # noise of both, at 1024 and 2048 samples
 
 
 def glass_by_place(tree: Any) -> Any:

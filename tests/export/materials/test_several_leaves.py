@@ -12,14 +12,47 @@ import pytest
 bpy = pytest.importorskip("bpy")
 
 from blender_addon.export.nodes.target_shader import target_shader  # noqa: E402
-from blender_addon.graph_values.mix_values import mix_values  # noqa: E402
+from blender_addon.graph_values.mix_values import inside_values, mix_values  # noqa: E402
 from blender_addon.result.write_back import apply_values, revert_values  # noqa: E402
 from mfo_backend.job.folder.job_folder import JobFolder  # noqa: E402
 from mfo_backend.job.folder.request import read_request  # noqa: E402
 from mfo_backend.job.run.fit_scene import request_materials  # noqa: E402
 
-from .test_mixed_targets import BLUE, DIFFUSE, GLOSSY, METAL, PLASTIC, RED, SHEEN, add, material_of, mix, noise  # noqa: E402
-from .test_node_graphs import ball, lit_scene  # noqa: E402
+from .test_mixed_targets import (  # noqa: E402
+    BLUE,
+    DIFFUSE,
+    GLOSSY,
+    METAL,
+    PLASTIC,
+    RED,
+    SHEEN,
+    TURNED,
+    Build,
+    add,
+    bumped,
+    material_of,
+    mix,
+    noise,
+    shader,
+)
+from .test_node_graphs import ball, coordinates, lit_scene  # noqa: E402
+
+COATED = shader("BsdfPrincipled", Base_Color=BLUE, Roughness=0.5, Coat_Weight=1.0, Coat_Roughness=0.3)
+
+
+def displaced(build: Build) -> Build:
+    """With a displacement by bump, which bends the normals of all shaders."""
+
+    def build_displaced(tree: Any) -> Any:
+        height, displacement = tree.nodes.new("ShaderNodeTexNoise"), tree.nodes.new("ShaderNodeDisplacement")
+        height.inputs["Scale"].default_value, displacement.inputs["Scale"].default_value = 2.0, 0.3
+        tree.links.new(coordinates(tree), height.inputs["Vector"])
+        tree.links.new(height.outputs[0], displacement.inputs["Height"])
+        tree.links.new(displacement.outputs[0], tree.get_output_node("CYCLES").inputs["Displacement"])
+        return build(tree)
+
+    return build_displaced
+
 
 # a mix, and other values for it
 CASES: dict[str, tuple[Any, dict[str, Any]]] = {
@@ -34,6 +67,26 @@ CASES: dict[str, tuple[Any, dict[str, Any]]] = {
     "added, three, a black side": (
         add(mix(0.6, DIFFUSE, None), mix(0.2, GLOSSY, mix(0.7, SHEEN, PLASTIC))),
         {"Mix Shader/Factor": 0.2, "Mix Shader.001/Factor": 0.6, "Principled BSDF/Base Color": RED},
+    ),
+    "the fitted one bumped": (
+        mix(0.4, bumped(DIFFUSE, 4.0), GLOSSY),
+        {"Mix Shader/Factor": 0.7, "Glossy BSDF/Color": (0.1, 0.6, 0.3), "Glossy BSDF/Roughness": 0.55},
+    ),
+    "the other one bumped": (
+        mix(0.4, DIFFUSE, bumped(GLOSSY, 4.0)),
+        {"Mix Shader/Factor": 0.7, "Glossy BSDF/Color": (0.1, 0.6, 0.3), "Glossy BSDF/Roughness": 0.55},
+    ),
+    "each bumped, one along its tangent": (
+        mix(0.3, bumped(METAL, 2.0, strength=0.3), bumped(TURNED["glossy"], 3.0, strength=0.3)),
+        {"Mix Shader/Factor": 0.6, "Glossy BSDF/Color": (0.1, 0.6, 0.3)},
+    ),
+    "a coat with a bump of its own": (
+        mix(0.3, bumped(DIFFUSE, 3.0), bumped(COATED, 5.0, "Coat Normal")),
+        {"Mix Shader/Factor": 0.6, "Principled BSDF/Base Color": RED},
+    ),
+    "displaced, the other one bumped": (
+        displaced(mix(0.4, DIFFUSE, bumped(GLOSSY, 4.0))),
+        {"Mix Shader/Factor": 0.7, "Glossy BSDF/Color": (0.1, 0.6, 0.3), "Glossy BSDF/Roughness": 0.55},
     ),
 }
 
@@ -92,11 +145,11 @@ def test_pictures_at_other_values_are_cycles(
     groups = paths.pixel_groups(paths.interior)
     vector = table.pack(table.unpack(renderer.start) | others)
     found = np.asarray(recorded.evaluator(paths, groups)(vector))
-    picture = renderer.image(vector, seed=0, spp=64).reshape(-1, 3)[groups.pixels]
+    picture = renderer.image(vector, seed=0, spp=256).reshape(-1, 3)[groups.pixels]
     notes = apply_values(material, others, report.folder, leaf="/".join(report.request["target"]["node"]))
     assert notes == []
     truth = render_cycles().reshape(-1, 3)[groups.pixels]
-    for shown, most in ((found[:, :, 0], 0.03), (picture, 0.08)):  # in narrow highlights, at 16 and 64 rays a pixel
+    for shown, most in ((found[:, :, 0], 0.03), (picture, 0.08)):  # in narrow highlights, at 16 and 256 rays a pixel
         assert abs(shown.mean() / truth.mean() - 1.0) < 0.003
         assert np.sqrt(np.mean((shown - truth) ** 2)) / truth.mean() < most
     step = 1e-3
@@ -108,3 +161,20 @@ def test_pictures_at_other_values_are_cycles(
         assert np.abs(change - slope).max() < 0.05 * np.abs(change).max() + 2e-6, table.names
     revert_values(material)
     np.testing.assert_allclose(loaded(export(target, fit=fit)).start, renderer.start, atol=1e-6)
+
+
+def test_what_bends_the_normals_of_a_mix_is_held(scene: Any) -> None:
+    """Its lanes keep one normal: a noise scale that feeds a factor alone is free, one of a bump besides is not."""
+    material = material_of(mix(noise, bumped(DIFFUSE, 4.0), GLOSSY))
+    target = target_shader(material)
+    assert target is not None
+    free = [value.name for value in inside_values(target)]
+    assert "Noise Texture/Scale" in free
+    assert "Bump/Strength" not in free
+    tree = material.node_tree
+    bump, texture = (
+        tree.nodes["Bump"],
+        tree.nodes["Mix Shader"].inputs[0].links[0].from_node.inputs[0].links[0].from_node,
+    )
+    tree.links.new(texture.outputs[0], bump.inputs["Height"])
+    assert "Noise Texture/Scale" not in [value.name for value in inside_values(target_shader(material))]

@@ -60,13 +60,13 @@ def test_a_further_material_of_a_kind_is_not_traced(tmp_path, monkeypatch):
     load(tmp_path, 1)
     from mfo_backend.material.plugins.principled_plugin import BlenderPrincipled  # needs a variant
 
-    traced, plain = [], BlenderPrincipled._layers
+    traced, plain = [], BlenderPrincipled.layers_at
 
     def counted(self, *arguments, **values):
         traced.append(self)
         return plain(self, *arguments, **values)
 
-    monkeypatch.setattr(BlenderPrincipled, "_layers", counted)
+    monkeypatch.setattr(BlenderPrincipled, "layers_at", counted)
     of = {}
     for count in (3, 7):
         first, _ = load(tmp_path, count)

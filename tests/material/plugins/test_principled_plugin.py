@@ -124,31 +124,6 @@ def test_shadow_rays_pass_by_what_alpha_leaves(alpha: float) -> None:
     np.testing.assert_allclose(passed, 1.0 - np.clip(alpha, 0.0, 1.0), atol=1e-6)
 
 
-# Cycles 5.0.1, one surface of rough glass in a uniform world of radiance 1 (see test_lobe_sampling)
-@pytest.mark.parametrize(("angle", "expected"), [(20, (0.95046, 0.89777, 0.84174)), (70, (0.95128, 0.89949, 0.84474))])
-def test_rough_glass_in_a_uniform_world(angle: int, expected: tuple[float, float, float]) -> None:
-    glass = {"base_color": {"type": "rgb", "value": [0.9, 0.8, 0.7]}, "transmission_weight": 1.0}
-    x, _, z = unit(angle, 0)
-    camera = mi.ScalarTransform4f().look_at([5 * x, 0, 5 * z], [0, 0, 0], [0, 1, 0])
-    film = {"type": "hdrfilm", "width": 8, "height": 8, "rfilter": {"type": "box"}}
-    scene = mi.load_dict(
-        {
-            "type": "scene",
-            "integrator": {"type": "path", "max_depth": 2},
-            "sensor": {"type": "orthographic", "to_world": camera, "film": film},
-            "world": {"type": "constant"},
-            "pane": {
-                "type": "rectangle",
-                "to_world": mi.ScalarTransform4f().scale(50),
-                "bsdf": {"type": "blender_principled", "unreachable_refraction": False, **glass},
-            },
-        }
-    )
-    pixels = np.array(mi.render(scene, spp=4096, seed=1)).reshape(-1, 3)
-    error = pixels.std(axis=0) / np.sqrt(len(pixels))
-    assert np.all(np.abs(pixels.mean(axis=0) - expected) < 4 * error + 1e-4)
-
-
 def test_emission_is_dimmed_by_what_lies_above() -> None:
     base = {"emission_color": (1.0, 0.5, 0.2), "emission_strength": 2.0}
 

@@ -1,7 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 from __future__ import annotations
 
-import re
 from pathlib import Path
 
 import numpy as np
@@ -82,13 +81,3 @@ def test_refuses_what_it_cannot_fit(tmp_path, parameters, materials, sentence: s
     with pytest.raises(BadInputError) as caught:
         load(tmp_path, parameters, materials)
     assert sentence in str(caught.value)
-
-
-@pytest.mark.parametrize("world", [True, False], ids=["uniform world", "lamp"])
-def test_rough_glass_counts_unreachable_directions_only_for_lights_cycles_samples(tmp_path: Path, world: bool) -> None:
-    text = re.sub("<emitter.*</emitter>", '<emitter type="constant"/>', SCENE) if world else SCENE
-    path = tmp_path / "scene.xml"
-    path.write_text(text)
-    materials = {"glaze": {"name": "Glaze", "sockets": SOCKETS}}
-    renderer = load_renderer(path, "target", model="blender_principled", parameters=["roughness"], materials=materials)
-    assert renderer.shape.bsdf().reachable_only == world  # pyright: ignore[reportAttributeAccessIssue]

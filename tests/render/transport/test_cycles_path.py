@@ -160,3 +160,35 @@ def test_every_model_shows_the_camera_its_own_world(tmp_path, model):
     picture = renderer.image(renderer.start, seed=0, spp=16)
     np.testing.assert_allclose(picture[0, 0], (0.1, 0.2, 0.3), atol=1e-5)
     assert picture[8, 8].min() > 0.1
+
+
+# Cycles 5.0.1, one surface of rough glass in a uniform world of radiance 1, whose light it leaves to the material
+@pytest.mark.parametrize(("angle", "expected"), [(20, (0.95046, 0.89777, 0.84174)), (70, (0.95128, 0.89949, 0.84474))])
+def test_rough_glass_in_a_uniform_world(angle, expected):
+    import mitsuba as mi
+
+    from mfo_backend.material.plugins import principled_plugin
+    from mfo_backend.render.transport import cycles_path
+
+    principled_plugin.register()
+    cycles_path.register()
+    glass = {"base_color": {"type": "rgb", "value": [0.9, 0.8, 0.7]}, "transmission_weight": 1.0}
+    x, z = np.sin(np.radians(angle)), np.cos(np.radians(angle))
+    camera = mi.ScalarTransform4f().look_at([5 * x, 0, 5 * z], [0, 0, 0], [0, 1, 0])
+    film = {"type": "hdrfilm", "width": 8, "height": 8, "rfilter": {"type": "box"}}
+    scene = mi.load_dict(
+        {
+            "type": "scene",
+            "integrator": {"type": "cycles_path", "max_depth": 2},
+            "sensor": {"type": "orthographic", "to_world": camera, "film": film},
+            "world": {"type": "constant"},
+            "pane": {
+                "type": "rectangle",
+                "to_world": mi.ScalarTransform4f().scale(50),
+                "bsdf": {"type": "blender_principled", "filtered": True, **glass},
+            },
+        }
+    )
+    pixels = np.array(mi.render(scene, spp=4096, seed=1)).reshape(-1, 3)
+    error = pixels.std(axis=0) / np.sqrt(len(pixels))
+    assert np.all(np.abs(pixels.mean(axis=0) - expected) < 4 * error + 1e-4)
