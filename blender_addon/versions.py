@@ -168,11 +168,6 @@ def has_diffuse_roughness() -> bool:
     return bpy.app.version >= (4, 3, 0)
 
 
-def bumps_look_at_pixels() -> bool:
-    """Whether bumps are differences over a pixel of what is rendered; from 4.4 on they are over a tenth of one."""
-    return bpy.app.version < (4, 4, 0)
-
-
 def counts_passages_exactly() -> bool:
     """Whether Cycles ends a path at the limit of transparent bounces; before 5.0 it goes through one surface more."""
     return bpy.app.version >= (5, 0, 0)

@@ -17,9 +17,9 @@ from numpy.typing import NDArray
 from ..export.camera.camera_model import Region
 from ..export.images.color_space import to_rec709
 from ..export.nodes.closure_leaves import OUTPUT
-from ..export.nodes.displacement import SHADING_NORMAL, displacement_in
+from ..export.nodes.displacement import SHADING_NORMAL, bends_normals
 from ..export.nodes.shader_graph import source_of
-from ..versions import active_output, bumps_look_at_pixels
+from ..versions import active_output
 from .aov_render import Frame, frame_of, render_outputs
 from .closure_tree import ClosureTree, Leaf
 from .graph_copy import node_at, nodes_of, own_copy, remove_copy
@@ -99,7 +99,7 @@ class Target:
         """What Cycles writes into the outputs of `copy`, which stands in for the material meanwhile."""
         try:
             with self._standing_in(copy):
-                by_pixels = bumps_look_at_pixels() and asks_beside(copy.node_tree)
+                by_pixels = looks_by_pixels(copy)
                 return render_outputs(self.scene, self.layer, wanted, frame, samples, by_pixels=by_pixels).values
         except RuntimeError as error:
             raise ProbeRequestError(f"Cycles cannot evaluate the nodes of '{self.material.name}': {error}") from error
@@ -234,17 +234,18 @@ def _output(tree: bpy.types.NodeTree, name: str, source: bpy.types.NodeSocket, i
     tree.links.new(source, node.inputs["Color" if is_color else "Value"])
 
 
-def asks_beside(tree: bpy.types.NodeTree) -> bool:
-    """Whether nodes look at points beside the one that they are asked for, for a bump."""
-    return displacement_in(tree) is not None or any(node.bl_idname == BUMP for node in nodes_of(tree))
+def looks_by_pixels(material: bpy.types.Material) -> bool:
+    """Whether a bump takes its differences over a width in pixels that nothing sets: that of a displacement, one whose
+    Filter Width has a link, and any before Blender 5.0."""
+    widths = [node.inputs.get("Filter Width") for node in nodes_of(material.node_tree) if node.bl_idname == BUMP]
+    return bends_normals(material) or any(width is None or width.is_linked for width in widths)
 
 
 def widen_bumps(tree: bpy.types.NodeTree, scale: int) -> None:
     """Let Bump nodes take their differences over the width of a pixel, which is `scale` subpixels."""
     for node in nodes_of(tree):
-        width = node.inputs.get("Filter Width") if node.bl_idname == BUMP else None
-        if width is not None and not width.is_linked:
-            width.default_value *= scale
+        if node.bl_idname == BUMP:
+            node.inputs["Filter Width"].default_value *= scale
 
 
 def cleaned(values: NDArray[np.float32], seen: NDArray[np.bool_], name: str, kind: str) -> NDArray[np.float32]:

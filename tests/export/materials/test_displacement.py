@@ -180,7 +180,9 @@ def test_a_normal_map_above_a_displacement_is_that_of_cycles(
 ) -> None:
     """As sets of textures have them: a picture on Normal and one on Displacement by bump."""
     lit_scene(scene)
-    material = new_material("Target", Base_Color=(0.4, 0.3, 0.2), Roughness=0.4, Coat_Weight=0.5)
+    # a coat as sharp as the default has its highlight in one pixel, of 16 rays
+    coat = {"Coat_Weight": 0.5, "Coat_Roughness": 0.3}
+    material = new_material("Target", Base_Color=(0.4, 0.3, 0.2), Roughness=0.4, **coat)
     tree, shader = material.node_tree, principled(material)
     bump = tree.nodes.new("ShaderNodeBump")
     bump.inputs["Distance"].default_value = 0.1
@@ -233,3 +235,35 @@ def test_a_displacement_that_cycles_cannot_bake_is_named(
     report = export(grid(material))
     assert report.notes == ("The displacement of 'Grid' is left out: No Blender answers.",)
     assert np.abs(vertices(report)[0][:, 2]).max() == 0.0
+
+
+@pytest.mark.parametrize("method", ["bump", "displacement"])
+def test_bumps_finer_than_a_subpixel_darken_as_in_cycles(
+    scene: Any, export: Any, render_cycles: Any, mitsuba: Any, method: str
+) -> None:
+    """In a mean of their normals they are flat: 4.7 and 2.5 % too bright."""
+    lit_scene(scene)
+    material, scale = new_material("Target", Roughness=0.6), 60.0
+    if method == "bump":
+        bump = material.node_tree.nodes.new("ShaderNodeBump")
+        bump.inputs["Distance"].default_value = 1.2 / scale
+        material.node_tree.links.new(noise(material, scale), bump.inputs["Height"])
+        material.node_tree.links.new(bump.outputs[0], principled(material).inputs["Normal"])
+    else:
+        displace(material, noise(material, scale), 1.2 / scale, "BUMP")
+    found, truth = recorded_and_cycles(export, render_cycles, ball(material))
+    assert abs(found.mean() / truth.mean() - 1.0) < 0.003
+
+
+@pytest.mark.skipif(bpy.app.version < (5, 0, 0), reason="its bumps have no Filter Width")
+def test_a_linked_filter_width_is_that_of_a_pixel(scene: Any, export: Any, render_cycles: Any, mitsuba: Any) -> None:
+    lit_scene(scene)
+    material = new_material("Target", Roughness=0.6)
+    tree = material.node_tree
+    bump, width = tree.nodes.new("ShaderNodeBump"), tree.nodes.new("ShaderNodeValue")
+    bump.inputs["Distance"].default_value, width.outputs[0].default_value = 0.05, 3.0
+    tree.links.new(noise(material, 15.0), bump.inputs["Height"])
+    tree.links.new(width.outputs[0], bump.inputs["Filter Width"])
+    tree.links.new(bump.outputs[0], principled(material).inputs["Normal"])
+    found, truth = recorded_and_cycles(export, render_cycles, ball(material))
+    assert abs(found.mean() / truth.mean() - 1.0) < 0.003
