@@ -18,25 +18,36 @@ from mfo_backend.types.image import Image
 
 from ..child_module import MATCHED_OR_NOT, run_module
 
-OBJECTS = ("Floor", "Walls", "Chest", "Ball", "Vase", "Shade")
 ROOMS = "studies.materials.scene"
 # Pictures of the truth beside the reference: one alone is uncertain by up to 0.006 on targets of 140 to 420 pixels
 FLOORS = 4
 
 
 def measure(
-    number: int, folder: Path, size: int, preset: str, *, nodes: bool = False, from_truth: bool = False
+    number: int,
+    folder: Path,
+    size: int,
+    preset: str,
+    *,
+    nodes: bool = False,
+    things: int = 0,
+    from_truth: bool = False,
 ) -> dict[str, Any]:
-    """The row of one room, whose values are inside `nodes` or of sockets alone; `from_truth` fits the truth's file."""
-    run_module(ROOMS, "build", number, folder, "--size", size, *(["--nodes"] if nodes else []))
+    """The row of one room, whose values are inside `nodes` or of sockets alone; `from_truth` fits the truth's file.
+
+    With `things` it is that many of them on a floor, which are fitted in a queue.
+    """
+    kind = ["--nodes"] if nodes else ["--things", things]
+    run_module(ROOMS, "build", number, folder, "--size", size, *kind)
     truth = json.loads((folder / "truth.json").read_text("utf-8"))
     names = [f"{name}/{value}" for name, values in truth.items() for value in values]
     pictures = {}
     for name, seed in (("reference", 3), *((f"floor{k}", 6 + k) for k in range(FLOORS))):
         pictures[name] = folder / f"{name}.exr"
         run_module(ROOMS, "render", folder / "truth.blend", pictures[name], seed)
-    words = [word for name in OBJECTS for word in ("--object", name)]
-    words += ["--parameters", ", ".join(names)] if nodes else []
+    words = [word for name in truth for word in ("--object", name)]
+    words += ["--parameters", ", ".join(names)] if nodes or things else []
+    words += ["--queue"] if things else []
     file = folder / ("truth.blend" if from_truth else "start.blend")
     began, cpu = time.monotonic(), _child_seconds()
     result = run_module(
@@ -49,7 +60,7 @@ def measure(
     run_module(ROOMS, "render", folder / "fitted.blend", pictures["fitted"], 5)
     images = {name: read_image(path, None) for name, path in pictures.items()}
     row: dict[str, Any] = {"number": number, "size": size, "preset": preset, "seconds": seconds, "cpu": cpu}
-    row["nodes"], row["from_truth"], row["truth"] = nodes, from_truth, truth
+    row["nodes"], row["things"], row["from_truth"], row["truth"] = nodes, things, from_truth, truth
     row["fit_seconds"], row["verdict"], row["materials"] = result["seconds"], result["verdict"], {}
     for found in result["materials"]:
         seen = read_image(folder / "job" / found["folder"] / "pictures" / "counted.png", None).pixels[..., 0] > 0.5

@@ -1,11 +1,12 @@
 # SPDX-License-Identifier: Apache-2.0
 """The rooms of `studies.materials`, run by a Python with `bpy`.
 
-    python -m studies.materials.scene build NUMBER FOLDER [--size PIXELS] [--nodes]
+    python -m studies.materials.scene build NUMBER FOLDER [--size PIXELS] [--nodes | --things COUNT]
     python -m studies.materials.scene render FILE PICTURE SEED [--samples COUNT]
 
 `build` writes truth.blend, start.blend and truth.json: a room of six materials, under a lamp in a shade and one or two
 others. With `--nodes` each has a graph of `studies.graphs`, whose values are drawn, instead of those of sockets alone.
+With `--things` it is that many small things over a floor instead, each of a material of its own.
 `render` shows a file in Cycles.
 """
 
@@ -14,6 +15,7 @@ from __future__ import annotations
 import argparse
 import json
 import random
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -22,13 +24,14 @@ from mathutils import Vector  # pyright: ignore[reportMissingImports]  # part of
 
 from ..graphs.materials import GRAPHS
 from ..graphs.values import FITTED, Drawn
+from .shelf import drawn_thing, put_up
 
 NODES = {"Floor": "ramp", "Walls": "bump", "Chest": "checker", "Ball": "hue", "Vase": "roughness", "Shade": "mixed"}
 OBJECTS = ("Floor", "Walls", "Chest", "Ball", "Vase", "Shade")
 
 
-def build(number: int, folder: Path, size: int, *, nodes: bool = False) -> None:
-    """Write both files and the truth."""
+def build(number: int, folder: Path, size: int, *, nodes: bool = False, things: int = 0) -> None:
+    """Write both files and the truth; the picture is `size` pixels wide."""
     folder.mkdir(parents=True, exist_ok=True)
     draw = random.Random(number)
     bpy.ops.wm.read_factory_settings(use_empty=True)
@@ -38,22 +41,34 @@ def build(number: int, folder: Path, size: int, *, nodes: bool = False) -> None:
     scene.render.resolution_x = scene.render.resolution_y = size
     scene.render.resolution_percentage = 100
     scene.view_settings.view_transform = "Standard"
-    _room()
-    _furniture(draw)
-    _lights(draw)
-    _camera()
-    inputs = {name: _material(scene.objects[name], name) for name in OBJECTS}
-    write = _write_nodes if nodes else _write_sockets
-    (folder / "truth.json").write_text(json.dumps(write(inputs, folder, draw)), "utf-8")
+    if things:
+        names = put_up(draw, things, size)
+    else:
+        names = list(OBJECTS)
+        _room()
+        _furniture(draw)
+        _lights(draw)
+        _camera()
+    inputs = {name: _material(scene.objects[name], name) for name in names}
+    if nodes:
+        truth = _write_nodes(inputs, folder, draw)
+    else:
+        truth = _write_sockets(inputs, folder, draw, drawn_thing if things else _drawn_truth)
+    (folder / "truth.json").write_text(json.dumps(truth), "utf-8")
 
 
-def _write_sockets(inputs: dict[str, bpy.types.NodeInputs], folder: Path, draw: random.Random) -> dict[str, Any]:
+def _write_sockets(
+    inputs: dict[str, bpy.types.NodeInputs],
+    folder: Path,
+    draw: random.Random,
+    drawn: Callable[[str, random.Random], dict[str, Any]],
+) -> dict[str, Any]:
     """Write both files with values of sockets; returns the truth."""
-    for name in OBJECTS:
+    for name in inputs:
         for socket, value in _drawn_start(draw).items():
             inputs[name][socket].default_value = value
     bpy.ops.wm.save_as_mainfile(filepath=str(folder / "start.blend"), copy=True)
-    truth = {name: _drawn_truth(name, draw) for name in OBJECTS}
+    truth = {name: drawn(name, draw) for name in inputs}
     for name, sockets in truth.items():
         for socket, value in sockets.items():
             inputs[name][socket].default_value = value
@@ -186,6 +201,7 @@ if __name__ == "__main__":
     one.add_argument("folder", type=Path)
     one.add_argument("--size", type=int, default=96)
     one.add_argument("--nodes", action="store_true")
+    one.add_argument("--things", type=int, default=0)
     one = commands.add_parser("render")
     one.add_argument("file", type=Path)
     one.add_argument("picture", type=Path)
@@ -193,6 +209,6 @@ if __name__ == "__main__":
     one.add_argument("--samples", type=int, default=256)
     chosen = parser.parse_args()
     if chosen.command == "build":
-        build(chosen.number, chosen.folder, chosen.size, nodes=chosen.nodes)
+        build(chosen.number, chosen.folder, chosen.size, nodes=chosen.nodes, things=chosen.things)
     else:
         render(chosen.file, chosen.picture, chosen.seed, chosen.samples)

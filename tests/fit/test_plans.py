@@ -3,6 +3,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import pytest
 
 from mfo_backend.fit.plans import RecordedPlan
@@ -25,3 +27,11 @@ def test_a_cheaper_preset_does_no_more():
     for name in ("too_noisy", "low_noise", "most_own"):  # and is content with more noise
         assert getattr(balanced, name) <= getattr(fast, name), name
     assert RecordedPlan.of("best").same_cost == 0.0  # it goes on from several solutions
+
+
+@pytest.mark.parametrize("preset", ["fast", "balanced", "best"])
+def test_a_small_target_has_no_more_own_noise_than_in_balanced(preset):
+    plan, balanced = RecordedPlan.of(preset), RecordedPlan.of("balanced")
+    small = plan.of_a_small_target()
+    assert small.most_own == balanced.most_own < 0.5  # or half of what is left is the recording's own
+    assert replace(small, most_own=plan.most_own) == plan

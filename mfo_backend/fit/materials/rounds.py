@@ -156,6 +156,8 @@ def take_turns(
             _share_needs(recorded, k)
             quick = replace(member.settings, preset="fast", verify_spp=LOOK_SAMPLES, losses=None)
             plan = None if number == 1 else RecordedPlan.of(member.settings.preset).among_others()
+            if queue:  # whose first round is the last
+                plan = RecordedPlan.of(quick.preset).of_a_small_target()
             try:
                 outcome = recover_material(
                     member.renderer, reference, quick if number == 1 else member.settings, display=display,

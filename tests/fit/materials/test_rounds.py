@@ -13,6 +13,7 @@ from mfo_backend.fit.materials import rounds
 from mfo_backend.fit.materials.evened_light import evened_light
 from mfo_backend.fit.materials.rounds import LIGHT_MOVED, MOST_VALUES, NOT_YET, Member, check_members, take_turns
 from mfo_backend.fit.materials.whole_course import WholeCourse
+from mfo_backend.fit.plans import RecordedPlan
 from mfo_backend.fit.result.outcome import FitOutcome
 from mfo_backend.fit.settings import FitSettings
 from mfo_backend.render.paths.recorded_scene import DIRECT, SceneNeeds
@@ -148,11 +149,13 @@ class Fits:
     def __init__(self, stop_after: int = 100) -> None:
         self.calls: list[tuple[str, str, bool]] = []
         self.recorded: list[object] = []
+        self.plans: list[object] = []
         self.stop_after = stop_after
 
     def __call__(self, wall: Wall, reference: Image, settings: FitSettings, **options: object) -> FitOutcome:
         self.calls.append((wall._name, settings.preset, options["begin"] is not None))
         self.recorded.append(options["recorded"])
+        self.plans.append(options["plan"])
         left = wall._name == "left"
         bright, lamp, lamp_of_other = (SHOWN.pixels[0, 0 if left else 7], *((1.0, 0.3) if left else (0.3, 1.0)))
         other = wall._shown["right" if left else "left"]
@@ -195,6 +198,8 @@ def test_a_queue_fits_each_once_and_quickly(monkeypatch: pytest.MonkeyPatch) -> 
     found = turns(fits, monkeypatch, queue=True)
     assert fits.calls == [("left", "fast", False), ("right", "fast", False)]
     assert (found.rounds, found.still) == (1, True)
+    # no later round mends what a recording's own noise did to few pixels
+    assert fits.plans == [RecordedPlan.of("fast").of_a_small_target()] * 2
 
 
 class Scene:
