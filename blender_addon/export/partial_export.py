@@ -21,7 +21,7 @@ from .findings import ExportError, Findings, NotShownError
 from .fitted_slot import FittedSlot, check_slots
 from .material_model import Material
 from .materials.chosen_leaves import chosen_mix_values, name_shares, with_mix_values
-from .materials.chosen_values import COPY, by_graph, request_of, write_copy
+from .materials.chosen_values import by_graph, request_of, write_copy
 from .materials.node_graph import FOLDER as GRAPH_FOLDER
 from .materials.node_graph import NodeGraph, evaluate_graph, largest_leaf, probe_for
 from .materials.read_material import with_default_tangent
@@ -153,7 +153,7 @@ def partial_export(
             ]
             with_copy = any(inside) and is_first  # which all pictures are evaluated in
             if with_copy:
-                write_copy(folder)  # as it was read
+                write_copy(folder / GRAPH_FOLDER)  # as it was read
             yield Pause(bakes.is_ready)
             finish_scene(data, findings, bakes)
         findings.raise_first()
@@ -197,9 +197,6 @@ def partial_export(
             if graph is not None:
                 requests[path]["graph"] = graph.request() | own
                 graph.write(folder / path)
-        if with_copy:
-            (folder / GRAPH_FOLDER).mkdir(exist_ok=True)
-            (folder / COPY).rename(folder / GRAPH_FOLDER / COPY)
     return PartialExport(requests.pop(""), findings, requests, tuple(leaves), frozenset(unseen))
 
 

@@ -184,9 +184,12 @@ def _view(scene: bpy.types.Scene, region: Region | None, origin: NDArray[np.floa
 def write_copy(folder: Path) -> None:
     """Write the copy of the file that the backend has evaluated into the folder of the graph's pictures.
 
+    Its relative paths are as from there: it cannot be moved.
+
     Raises
     ------
     OSError
         If it cannot be written.
     """
+    folder.mkdir(exist_ok=True)
     save_copy(folder / COPY)

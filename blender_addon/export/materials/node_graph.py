@@ -54,7 +54,7 @@ class NodeGraph:
 
     def write(self, folder: Path) -> None:
         """Move the files into a job folder."""
-        (folder / FOLDER).mkdir()
+        (folder / FOLDER).mkdir(exist_ok=True)
         for path in self.files:
             shutil.move(path, folder / FOLDER / path.name)
 

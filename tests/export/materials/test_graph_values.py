@@ -230,3 +230,26 @@ def test_a_value_that_reaches_nothing_a_model_has_is_not_offered() -> None:
     target = target_shader(material)
     assert target is not None
     assert graph_values(target) == []
+
+
+def test_the_copy_that_is_evaluated_finds_its_pictures(scene: Any, export: Any, tmp_path: Path) -> None:
+    """Blender writes paths as seen from the file: one that was moved afterwards showed magenta for every picture."""
+    lit_scene(scene)
+    material = new_material("Target")
+    tree, shader = material.node_tree, principled(material)
+    image = bpy.data.images.new("Leather", 4, 4)
+    image.filepath_raw, image.file_format = str(tmp_path / "textures" / "leather.png"), "PNG"
+    image.save()
+    texture, hue = tree.nodes.new("ShaderNodeTexImage"), tree.nodes.new("ShaderNodeHueSaturation")
+    texture.image = image
+    tree.links.new(texture.outputs[0], hue.inputs["Color"])
+    tree.links.new(hue.outputs[0], shader.inputs["Base Color"])
+    target = ball(material)
+    bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "scene.blend"))
+    image.filepath = "//textures/leather.png"
+    report = export(target, fit={"parameters": ["roughness", "Hue Saturation Value/Value"]})
+    copy = report.folder / "graph" / "scene.blend"
+    bpy.ops.wm.open_mainfile(filepath=str(copy))
+    path = bpy.data.images["Leather"].filepath
+    assert path.startswith("//")
+    assert Path(bpy.path.abspath(path)).resolve() == (tmp_path / "textures" / "leather.png").resolve()
