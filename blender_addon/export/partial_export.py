@@ -151,9 +151,8 @@ def partial_export(
                 request_of(context, each, data.materials[target_bsdf(k)], own.values, region, data.origin)
                 for k, (each, own) in enumerate(zip(fitted, wanted, strict=True))
             ]
-            with_copy = any(inside) and is_first  # which all pictures are evaluated in
-            if with_copy:
-                write_copy(folder / GRAPH_FOLDER)  # as it was read
+            if any(inside) and is_first:  # all pictures are evaluated in its copy, as it was read
+                write_copy(folder / GRAPH_FOLDER)
             yield Pause(bakes.is_ready)
             finish_scene(data, findings, bakes)
         findings.raise_first()

@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 from ..export.camera.camera_model import Region
 from ..export.images.color_space import to_rec709
 from ..export.nodes.closure_leaves import OUTPUT
+from ..export.nodes.dependence import OF_FACING, asked_for
 from ..export.nodes.displacement import SHADING_NORMAL, bends_normals
 from ..export.nodes.shader_graph import source_of
 from ..versions import active_output
@@ -94,12 +95,17 @@ class Target:
         return NotSeenError(NOT_SEEN.format(obj=self.obj.name))
 
     def outputs(
-        self, copy: bpy.types.Material, wanted: list[tuple[str, bool]], frame: Frame, samples: int
+        self,
+        copy: bpy.types.Material,
+        wanted: list[tuple[str, bool]],
+        frame: Frame,
+        samples: int,
+        *,
+        by_pixels: bool = False,
     ) -> dict[str, NDArray[np.float32]]:
         """What Cycles writes into the outputs of `copy`, which stands in for the material meanwhile."""
         try:
             with self._standing_in(copy):
-                by_pixels = looks_by_pixels(copy)
                 return render_outputs(self.scene, self.layer, wanted, frame, samples, by_pixels=by_pixels).values
         except RuntimeError as error:
             raise ProbeRequestError(f"Cycles cannot evaluate the nodes of '{self.material.name}': {error}") from error
@@ -234,11 +240,15 @@ def _output(tree: bpy.types.NodeTree, name: str, source: bpy.types.NodeSocket, i
     tree.links.new(source, node.inputs["Color" if is_color else "Value"])
 
 
-def looks_by_pixels(material: bpy.types.Material) -> bool:
-    """Whether a bump takes its differences over a width in pixels that nothing sets: that of a displacement, one whose
-    Filter Width has a link, and any before Blender 5.0."""
-    widths = [node.inputs.get("Filter Width") for node in nodes_of(material.node_tree) if node.bl_idname == BUMP]
-    return bends_normals(material) or any(width is None or width.is_linked for width in widths)
+def looks_by_pixels(material: bpy.types.Material, *, turned: bool) -> bool:
+    """Whether a bump takes its differences over a width in pixels that nothing sets: one whose Filter Width has a link,
+    any before Blender 5.0, and that of a displacement where directions are asked for (`turned`) or nodes ask for the
+    normal."""
+    tree = material.node_tree
+    widths = [node.inputs.get("Filter Width") for node in nodes_of(tree) if node.bl_idname == BUMP]
+    if any(width is None or width.is_linked for width in widths):
+        return True
+    return bends_normals(material) and (turned or bool(asked_for(tree, OF_FACING)))
 
 
 def widen_bumps(tree: bpy.types.NodeTree, scale: int) -> None:

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -185,7 +186,9 @@ class VariantPictures:
         copy, base = own_copy(material), own_copy(material)
         try:
             make_opaque(copy)
-            if not looks_by_pixels(copy):
+            turned = [(_name(k, i), True) for k, i, name in of_each if self.paths[name][-1] in DIRECTIONS]
+            by_pixels = looks_by_pixels(copy, turned=bool(turned))
+            if not by_pixels:
                 widen_bumps(base.node_tree, frame.scale)
             wanted, kinds = [(MASK, False), (POSITION, True)], {}
             for k, variant in enumerate(variants):
@@ -198,11 +201,11 @@ class VariantPictures:
                 kinds |= _put_outputs(tree, self.paths, outputs)
                 wanted += [(output, kinds[name] != "VALUE") for name, output in outputs.items()]
             at_depths = peeled(copy.node_tree, wanted, depths[-1] + 1)
-            found = joined_depths(self.target.outputs(copy, at_depths, frame, self.samples), wanted, depths)
-            turned = [(_name(k, i), True) for k, i, name in of_each if self.paths[name][-1] in DIRECTIONS]
+            outputs = partial(self.target.outputs, copy, frame=frame, by_pixels=by_pixels)
+            found = joined_depths(outputs(at_depths, samples=self.samples), wanted, depths)
             if turned and self.samples > 1:
                 asked = [(at_depth(name, depth), True) for name, _ in turned for depth in range(depths[-1] + 1)]
-                single = joined_depths(self.target.outputs(copy, asked, frame, 1), turned, depths)
+                single = joined_depths(outputs(asked, samples=1), turned, depths)
                 found |= {name: _single(picture, found[name]) for name, picture in single.items()}
         finally:
             remove_copy(copy)
@@ -212,10 +215,9 @@ class VariantPictures:
 
 
 def _single(one: Picture, mean: Picture) -> Picture:
-    """Directions of one sample each where their mean is shorter than they are, else, and where it missed the target,
-    that mean."""
-    lengths = (np.linalg.norm(each, axis=-1, keepdims=True) for each in (one, mean))
-    own, common = lengths
+    """Directions of one sample each where they scatter: their mean is shorter than they are. Elsewhere that mean, also
+    where the one sample missed the target."""
+    own, common = (np.linalg.norm(each, axis=-1, keepdims=True) for each in (one, mean))
     return np.where((own > SEEN) & (common < (1.0 - APART) * own), one, mean)
 
 

@@ -20,10 +20,10 @@ from pathlib import Path
 from typing import Any
 
 import bpy
-from mathutils import Vector  # pyright: ignore[reportMissingImports]  # part of bpy
 
 from ..graphs.materials import GRAPHS
 from ..graphs.values import FITTED, Drawn
+from .lights import grey_world, light, look_at
 from .shelf import drawn_thing, put_up
 
 NODES = {"Floor": "ramp", "Walls": "bump", "Chest": "checker", "Ball": "hue", "Vase": "roughness", "Shade": "mixed"}
@@ -133,31 +133,18 @@ def _furniture(draw: random.Random) -> None:
 
 
 def _lights(draw: random.Random) -> None:
-    world = bpy.context.scene.world = bpy.data.worlds.new("World")
-    world.use_nodes = True
-    level = draw.uniform(0.05, 0.3)
-    background = next(node for node in world.node_tree.nodes if node.type == "BACKGROUND")
-    background.inputs["Color"].default_value = (level, level, level, 1.0)
-    bulb = _light("Bulb", "POINT", draw.uniform(60.0, 140.0), (0.1, 1.3, 2.2))
+    grey_world(draw.uniform(0.05, 0.3))
+    bulb = light("Bulb", "POINT", draw.uniform(60.0, 140.0), (0.1, 1.3, 2.2))
     bulb.data.shadow_soft_size = draw.uniform(0.08, 0.15)
-    lamp = _light("Lamp", "AREA", draw.uniform(150.0, 320.0), (draw.uniform(-2.0, 2.0), -2.4, 3.3))
+    lamp = light("Lamp", "AREA", draw.uniform(150.0, 320.0), (draw.uniform(-2.0, 2.0), -2.4, 3.3))
     lamp.data.size = draw.uniform(0.6, 1.6)
-    lamp.rotation_euler = (Vector((0.0, 0.3, 0.6)) - lamp.location).to_track_quat("-Z", "Y").to_euler()
-
-
-def _light(name: str, kind: str, energy: float, place: tuple[float, float, float]) -> bpy.types.Object:
-    data = bpy.data.lights.new(name, kind)
-    data.energy = energy
-    lamp = bpy.data.objects.new(name, data)
-    lamp.location = place
-    bpy.context.collection.objects.link(lamp)
-    return lamp
+    look_at(lamp, (0.0, 0.3, 0.6))
 
 
 def _camera() -> None:
     camera = bpy.data.objects.new("Camera", bpy.data.cameras.new("Camera"))
     camera.location, camera.data.lens = (0.0, -8.2, 2.5), 42.0
-    camera.rotation_euler = (Vector((0.0, 0.0, 1.35)) - camera.location).to_track_quat("-Z", "Y").to_euler()
+    look_at(camera, (0.0, 0.0, 1.35))
     bpy.context.collection.objects.link(camera)
     bpy.context.scene.camera = camera
 

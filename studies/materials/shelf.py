@@ -10,6 +10,8 @@ from typing import Any
 import bpy
 from mathutils import Vector  # pyright: ignore[reportMissingImports]  # part of bpy
 
+from .lights import grey_world, light, look_at
+
 IN_A_ROW = 10
 APART = 1.0  # between the middles of two things
 SHARE = 0.62  # of the way from one row to the next in the picture
@@ -91,14 +93,8 @@ def _floor(width: float, depth: float) -> None:
 
 
 def _lights(draw: random.Random) -> None:
-    world = bpy.context.scene.world = bpy.data.worlds.new("World")
-    world.use_nodes = True
-    level = draw.uniform(0.1, 0.3)
-    background = next(node for node in world.node_tree.nodes if node.type == "BACKGROUND")
-    background.inputs["Color"].default_value = (level, level, level, 1.0)
-    data = bpy.data.lights.new("Lamp", "AREA")
-    data.energy, data.size = draw.uniform(450.0, 900.0), draw.uniform(1.5, 4.0)
-    lamp = bpy.data.objects.new("Lamp", data)
-    lamp.location = (draw.uniform(-5.0, 5.0), -4.0, 6.5)
-    lamp.rotation_euler = (Vector() - lamp.location).to_track_quat("-Z", "Y").to_euler()
-    bpy.context.collection.objects.link(lamp)
+    grey_world(draw.uniform(0.1, 0.3))
+    energy, size = draw.uniform(450.0, 900.0), draw.uniform(1.5, 4.0)
+    lamp = light("Lamp", "AREA", energy, (draw.uniform(-5.0, 5.0), -4.0, 6.5))
+    lamp.data.size = size
+    look_at(lamp, (0.0, 0.0, 0.0))

@@ -26,6 +26,7 @@ import drjit as dr
 import mitsuba as mi
 
 from ..arrays.clamp import mean
+from ..principled.bumped_normals import LEAF_NORMALS
 from ..principled.mix_values import Way, amount_of, ways_in
 from ..principled.random_walk import Below
 from .principled_plugin import BlenderPrincipled
@@ -201,12 +202,13 @@ class ClosureTree(mi.BSDF):
         if not self.is_open:
             return values
         values["weight"] = self.fitted.plain_weight_at(si, active)
-        frame = self.bumped_frame(si, active)[0] if self.directions else si.sh_frame
+        bumped = any(leaf.material.directions for leaf in self.free_leaves.values())
+        frame = self.bumped_frame(si, active)[0] if bumped and self.directions else si.sh_frame
         for k, leaf in self.free_leaves.items():
             of_leaf = leaf.material.values_at(si, active) | {"weight": leaf.plain_weight_at(si, active)}
             if leaf.material.directions:
                 given = leaf.material.normals_at(si, active)
-                of_leaf |= {name: mi.Vector3f(frame.to_local(direction)) for name, direction in given.items()}
+                of_leaf |= {name: mi.Vector3f(frame.to_local(given[name])) for name in LEAF_NORMALS.names}
             values |= {f"leaf_{k}.{name}": value for name, value in of_leaf.items()}
         return values
 

@@ -35,7 +35,7 @@ from ...types.parameter import Value
 from ..arrays.clamp import saturate
 from ..cycles_model import CyclesModel, cycles_model
 from ..principled.blender_principled import evaluate
-from ..principled.bumped_normals import valid_normal
+from ..principled.bumped_normals import BUMPED_NORMALS, valid_normal
 from ..principled.layers import Layers, layer_stack, sampled_emission
 from ..principled.lobe_sampling import NAMES, LobeChoice, is_diffuse, lobe_choice, pdf, sample
 from ..principled.needed_lobes import Lobes, needed_lobes
@@ -211,7 +211,6 @@ class BlenderPrincipled(mi.BSDF):
         """The frame of the microfacet lobes at a surface point, the view in it, and the other normals in it by name."""
         view: Any = si.to_world(si.wi)
         side: Any = dr.mulsign(mi.Float(1), si.wi.z)
-        smooth = self.shading_normal(si, active)
         given = self.normals_at(si, active)
         n, along = given["normal"] * side, given["tangent"]
         s = dr.normalize(along - n * dr.dot(n, along))
@@ -219,12 +218,11 @@ class BlenderPrincipled(mi.BSDF):
         own: Any = si.sh_frame
         handed = dr.dot(dr.cross(own.n, own.s), own.t)
         frame = mi.Frame3f(s, dr.mulsign(dr.cross(n, s), handed), n)
-        others = {"smooth_normal": smooth} | {name: given[name] for name in ("bumped_normal", "coat_normal")}
-        return frame, frame.to_local(view), {name: frame.to_local(other) for name, other in others.items()}
+        return frame, frame.to_local(view), {name: frame.to_local(given[name]) for name in BUMPED_NORMALS.names}
 
     def normals_at(self, si: mi.SurfaceInteraction3f, active: Any) -> dict[str, mi.Vector3f]:
-        """World directions at a surface point, on the side of the view: the `normal` of the microfacet lobes, that of
-        diffuse and sheen (`bumped_normal`) and of the coat, and the `tangent`, in no particular plane."""
+        """World directions at a surface point, on the side of the view: the `normal` of the microfacet lobes, those of
+        `BUMPED_NORMALS`, and the `tangent`, in no particular plane."""
         view: Any = si.to_world(si.wi)
         geometric, smooth = _towards(view, si), self.shading_normal(si, active)
         bumped = self._turned_to_view("normal", si, smooth, active)
@@ -234,7 +232,9 @@ class BlenderPrincipled(mi.BSDF):
             given = mi.Vector3f(self.directions["tangent"].eval(si, active))
             along = dr.select(dr.norm(given) > GIVEN, dr.normalize(given), along)
         facets = valid_normal(geometric, view, bumped)
-        return {"normal": facets, "bumped_normal": bumped, "coat_normal": coat, "tangent": along}
+        return {
+            "normal": facets, "smooth_normal": smooth, "bumped_normal": bumped, "coat_normal": coat, "tangent": along,
+        }  # fmt: skip
 
     def shading_normal(self, si: mi.SurfaceInteraction3f, active: Any) -> mi.Vector3f:
         """The mesh's normal on the side of the view, as a displacement by bump has bent it."""
@@ -280,12 +280,13 @@ class BlenderPrincipled(mi.BSDF):
     def _choice(self, ctx: mi.BSDFContext, layers: Layers) -> LobeChoice:
         return lobe_choice(layers, with_transparency=self.lobes.alpha)
 
-    def _reachable_only(self, si: mi.SurfaceInteraction3f) -> Any:
+    def reachable_only(self, si: mi.SurfaceInteraction3f) -> Any:
+        """Where directions no microfacet of rough glass leads to do not count: for light Cycles does not sample."""
         return si.duv_dy.x > 0 if self.filtered and self.lobes.transmission else False
 
     def eval(self, ctx: mi.BSDFContext, si: mi.SurfaceInteraction3f, wo: mi.Vector3f, active: Any = True) -> Any:
         """f_r |cos|, RGB."""
-        surface, only = self.layers_at(si, active), self._reachable_only(si)
+        surface, only = self.layers_at(si, active), self.reachable_only(si)
         value = mi.Color3f(evaluate(surface.layers, surface.to_local(wo), reachable_only=only))
         return dr.select(active, value, 0)
 
@@ -298,7 +299,7 @@ class BlenderPrincipled(mi.BSDF):
     ) -> tuple[Any, Any]:
         """`eval` and `pdf`, the layers evaluated once; with the values of another material of this `kind` `instead`."""
         surface = self.layers_at(si, active, **instead)
-        layers, local, only = surface.layers, surface.to_local(wo), self._reachable_only(si)
+        layers, local, only = surface.layers, surface.to_local(wo), self.reachable_only(si)
         density = pdf(layers, self._choice(ctx, layers), local, reachable_only=only)
         value = mi.Color3f(evaluate(layers, local, reachable_only=only))
         return dr.select(active, value, 0), dr.select(active, density, 0)

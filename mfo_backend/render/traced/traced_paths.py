@@ -212,10 +212,8 @@ class TracedPaths:
                 scene, self._shadows, si, rng.pair(2 + 3 * depth), scatters,
                 None if alpha is None else self._bsdf, s["passages"], s["inside"],
             )  # fmt: skip
-            wo, unsampled = si.to_local(ds.d), False
-            if self._light_paths is not None:
-                unsampled = is_unsampled(ds)
-                si.duv_dy = mi.Point2f(dr.select(unsampled, 1.0, 0.0), 0.0)
+            si.duv_dy = mi.Point2f(dr.select(is_unsampled(ds), 1.0, 0.0), 0.0)
+            wo = si.to_local(ds.d)
             lit = scatters & (ds.pdf > 0.0)
             if self._glow is not None:  # which is left to the rays that meet it
                 lit &= ds.emitter != mi.EmitterPtr(self._glow)
@@ -223,7 +221,7 @@ class TracedPaths:
             ours = si.bsdf() == mi.BSDFPtr(self._bsdf) if self._others else mi.Bool(True)
             on = active & ours
             at_hit = on if self._glow is None else met & ours
-            found = self._target.at(si, wo, u1, u2, at_hit, on, theta, offset, directions, unsampled)
+            found = self._target.at(si, wo, u1, u2, at_hit, on, theta, offset, directions)
             f_light, pdf_light, f_next, pdf_next = found.light, found.light_density, found.following, found.density
             local, kind = found.drawn, found.kind
             if self._glow is not None:

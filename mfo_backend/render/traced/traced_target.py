@@ -81,10 +81,9 @@ class TracedTarget:
         moved = zip(slopes[DENSITY], slopes[COLOR], strict=True)
         return [coefficient(*values.values()), *(a * rest - b * density for a, b in moved)]
 
-    def at(self, si, wo, u1, u2, met, on, theta, offset, directions, unsampled=False) -> Scattering:
+    def at(self, si, wo, u1, u2, met, on, theta, offset, directions) -> Scattering:
         """What it does with light from `wo`, and in a direction drawn by `u1` and `u2`, where paths go `on`; its own
-        light wherever they have `met` it. The vector of a path begins at its `offset` in `theta`. `unsampled` says
-        where light from `wo` is such as Cycles does not sample."""
+        light wherever they have `met` it. The vector of a path begins at its `offset` in `theta`."""
         plugin = self.plugin
         entries = [dr.gather(mi.Float, theta, offset + k, met) for k in range(self.table.length)]
         if directions:
@@ -103,9 +102,9 @@ class TracedTarget:
         if mixture is not None:
             drawn = dr.select(mixture.is_held, surface.to_local(mixture.drawn.wo), drawn)
             valid = dr.select(mixture.is_held, mixture.drawn.pdf > 0.0, valid)
-        towards = dr.detach(surface.to_local(wo))
-        f_light = mi.Color3f(evaluate(layers, towards, reachable_only=unsampled))
-        pdf_light = dr.detach(pdf(layers, choice, towards, reachable_only=unsampled))
+        towards, only = dr.detach(surface.to_local(wo)), plugin.reachable_only(si)
+        f_light = mi.Color3f(evaluate(layers, towards, reachable_only=only))
+        pdf_light = dr.detach(pdf(layers, choice, towards, reachable_only=only))
         f_next = mi.Color3f(evaluate(layers, drawn))
         pdf_next = dr.detach(pdf(layers, choice, drawn))
         diffuse = is_diffuse(lobe, plugin.model.shader)

@@ -148,7 +148,7 @@ CASES = {
     "half black": mix(0.4, DIFFUSE, None),
     "added": add(DIFFUSE, shader("BsdfAnisotropic", Color=(0.2, 0.2, 0.2), Roughness=0.3)),
     "a colour that shines": mix(0.4, DIFFUSE, occlusion),
-    "a bumped one and a plain one": mix(0.6, bumped(DIFFUSE, 4.0), GLOSSY),
+    "a bumped one and a plain one": mix(0.4, bumped(DIFFUSE, 4.0), shader("BsdfDiffuse", Color=BLUE)),
     "three and a glow": add(mix(noise, DIFFUSE, mix(0.5, GLOSSY, SHEEN)), mix(noise, GLOW, None)),
 }
 
