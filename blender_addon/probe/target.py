@@ -242,7 +242,7 @@ def _output(tree: bpy.types.NodeTree, name: str, source: bpy.types.NodeSocket, i
 
 def looks_by_pixels(material: bpy.types.Material, *, turned: bool) -> bool:
     """Whether a bump takes its differences over a width in pixels that nothing sets: one whose Filter Width has a link,
-    any before Blender 5.0, and that of a displacement where directions are asked for (`turned`) or nodes ask for the
+    any before Blender 4.4, and that of a displacement where directions are asked for (`turned`) or nodes ask for the
     normal."""
     tree = material.node_tree
     widths = [node.inputs.get("Filter Width") for node in nodes_of(tree) if node.bl_idname == BUMP]

@@ -255,7 +255,7 @@ def test_bumps_finer_than_a_subpixel_darken_as_in_cycles(
     assert abs(found.mean() / truth.mean() - 1.0) < 0.003
 
 
-@pytest.mark.skipif(bpy.app.version < (5, 0, 0), reason="its bumps have no Filter Width")
+@pytest.mark.skipif(bpy.app.version < (4, 4, 0), reason="its bumps have no Filter Width")
 def test_a_linked_filter_width_is_that_of_a_pixel(scene: Any, export: Any, render_cycles: Any, mitsuba: Any) -> None:
     lit_scene(scene)
     material = new_material("Target", Roughness=0.6)
