@@ -168,6 +168,7 @@ def _make_small(scene: bpy.types.Scene, size: int) -> None:
     sides = settings.resolution_x, settings.resolution_y
     settings.resolution_x, settings.resolution_y = (max(8, round(side * size / max(sides))) for side in sides)
     settings.resolution_percentage = 100
+    settings.pixel_aspect_x = settings.pixel_aspect_y = 1.0  # as the pictures of a job, which `mfo judge` compares
 
 
 def _move_values(material: bpy.types.Material, draw: random.Random) -> list[str]:

@@ -68,11 +68,15 @@ def region_parts(render: bpy.types.RenderSettings) -> tuple[float, float, float,
 
 
 def render_as(render: bpy.types.RenderSettings, picture: Size, frame: Mapping[str, int]) -> None:
-    """Have the scene render pictures of a job's size; `frame` is that of request.json, empty where they show all."""
+    """Have the scene render pictures of a job's size; `frame` is that of request.json, empty where they show all.
+
+    A job's pixels are square, also where the scene's are not.
+    """
     if not frame:
         render.use_border = False
-    if render.pixel_aspect_x != render.pixel_aspect_y or not all(picture):
+    if not all(picture):
         return
+    render.pixel_aspect_x = render.pixel_aspect_y = 1.0
     size = (frame["width"], frame["height"]) if frame else picture
     render.resolution_x, render.resolution_y, render.resolution_percentage = *size, 100
     if frame:

@@ -10,11 +10,13 @@ import numpy as np
 import pytest
 
 from blender_addon.export.camera.render_region import (
+    picture_size,
     pictured_region,
     pictured_size,
     region_settings,
     render_as,
     render_region,
+    square_size,
 )
 from blender_addon.export.job import ExportError, check_export, export_job
 
@@ -143,3 +145,17 @@ def test_a_check_renders_what_the_job_shows(scene: Any) -> None:
     assert region is not None
     assert (region.left, region.top, region.right, region.bottom) == (7, 3, 47, 23)
     assert (render.resolution_x, render.resolution_y, render.use_crop_to_border) == (100, 50, True)
+
+
+@pytest.mark.parametrize(("aspect", "size"), [((2.0, 1.0), (80, 30)), ((1.0, 1.5), (40, 45))])
+def test_a_check_shows_the_frame_of_pixels_that_are_not_square(
+    scene: Any, aspect: tuple[float, float], size: tuple[int, int]
+) -> None:
+    render, lens = scene.render, add_camera("PERSP", (0, 0, 5)).data
+    render.resolution_x, render.resolution_y, render.resolution_percentage = 40, 30, 100
+    render.pixel_aspect_x, render.pixel_aspect_y = aspect
+    assert square_size(render) == size
+    framed = np.array(lens.view_frame(scene=scene))
+    render_as(render, size, {})
+    assert picture_size(render) == square_size(render) == size
+    np.testing.assert_allclose(lens.view_frame(scene=scene), framed, atol=1e-6)
