@@ -66,19 +66,20 @@ def walked_lanes(
     number = lane - sample * rays
     entered, medium = dr.gather(mi.SurfaceInteraction3f, si, number), below.gathered(number)
     reached = dr.max(medium.weight) > 0.0
+    place = dr.gather(mi.UInt32, hits.position, number) + sample * pixels
     walks = walked(
         scene, entered, medium, random, reached, spread=settings.spread, alphas=ENTRIES,
-        choice=_even_choice(number, dr.gather(mi.UInt32, hits.position, number) + sample * pixels, settings.seed),
+        choice=_even_choice(number, place, settings.seed),
     )  # fmt: skip
     index = dr.compress(walks.out)
     ray = dr.gather(mi.UInt32, number, index)
     exits = dr.gather(mi.SurfaceInteraction3f, walks.si, index)
     light = dr.zeros(mi.Color3f, dr.width(index))
-    if dr.width(index) > 0:  # a surface that encloses nothing lets none out
+    if dr.width(index) > 0:  # none leaves a metal, or a surface that encloses nothing
         sampler = fresh_sampler(settings.seed ^ _APART, dr.width(index))
         light = exit_light(scene, exits, sampler, settings.light_paths, settings.depth)
     weight = light * dr.gather(mi.Float, hits.weight, ray)
-    position = dr.gather(mi.UInt32, hits.position, ray) + dr.gather(mi.UInt32, sample, index) * pixels
+    position = dr.gather(mi.UInt32, place, index)
     view = dr.gather(mi.Vector3f, hits.wi, ray)
     kept = [dr.gather(type(value), value, ray) for value in hits.held]
     walk = [dr.gather(mi.Float, value, index) for value in walks.held]

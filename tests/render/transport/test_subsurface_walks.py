@@ -5,6 +5,7 @@ Cycles is the oracle in tests/export/materials/test_subsurface.py."""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
@@ -28,9 +29,11 @@ def below(**values: Any) -> dict[str, Any]:
     return {"target_bsdf": {"name": "Wax", "distribution": "MULTI_GGX", "sockets": sockets}}
 
 
-def load(folder: Path, lights: str, materials: dict[str, Any], size: int = 16) -> Any:
+def load(
+    folder: Path, lights: str, materials: dict[str, Any], size: int = 16, parameters: Sequence[str] = ("base_color",)
+) -> Any:
     return load_renderer(
-        write_scene(folder, lights, size=size), "target", model="blender_principled", parameters=["base_color"],
+        write_scene(folder, lights, size=size), "target", model="blender_principled", parameters=list(parameters),
         materials=materials, light_paths=LightPaths(),
     )  # fmt: skip
 
@@ -91,3 +94,13 @@ def test_an_eye_sees_that_light_travels(tmp_path: Path) -> None:
     picture = renderer.image(renderer.start, seed=0, spp=64)
     dark = renderer.target_mask() & (picture[..., 2] < 0.05 * picture[..., 2].max())
     assert picture[dark][:, 0].mean() > 3.0 * picture[dark][:, 2].mean()
+
+
+@pytest.mark.parametrize("lights", [POINT, SKY], ids=["point", "sky"])
+@pytest.mark.parametrize("free", ["metallic", "coat_weight"])
+def test_a_metal_with_subsurface_has_no_walks(tmp_path: Path, lights: str, free: str) -> None:
+    """No light goes below a metal, which may become wax or not; a recording of it is its picture, as any other."""
+    renderer = load(tmp_path, lights, below(Metallic=1.0, Roughness=0.5), parameters=[free])
+    found, pixels = recorded(renderer, renderer.start, renderer.start, near=True)
+    picture = renderer.image(renderer.start, seed=0, spp=1024).reshape(-1, 3)[pixels]
+    np.testing.assert_allclose(found.mean(axis=0), picture.mean(axis=0), rtol=0.02)
