@@ -52,6 +52,8 @@ def render_state(view_layer: bpy.types.ViewLayer, scene: bpy.types.Scene) -> Ite
             # what is hidden is left out of collections' instances; particles and nodes that name it still show it
             if item.mode == "OBJECT" or not item.hide_render:
                 put(item, "hide_viewport", item.hide_render)
+            # also of a source of particles or nodes that is put away; `show_self` of every instance asks for it
+            put(item, "show_instancer_for_viewport", item.show_instancer_for_render)
             if item.hide_render:
                 continue
             if item in in_layer and item.hide_get(view_layer=view_layer):

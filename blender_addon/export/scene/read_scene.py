@@ -278,12 +278,12 @@ class _Walk:
         self.data.shapes[:] = [replace(shape, mesh=joined(meshes[shape.identifier])) for shape in self.data.shapes]
 
     def _is_rendered(self, instance: bpy.types.DepsgraphObjectInstance, item: bpy.types.Object) -> bool:
+        if not instance.show_self:  # an instancer that is not shown, or an instance of one
+            return False
         if instance.is_instance:
             parent = instance.parent
             return parent is not None and parent.original.name_full in self.rendered
-        if item.original.name_full not in self.rendered or hides_original(item):
-            return False
-        return not item.is_instancer or item.show_instancer_for_render
+        return item.original.name_full in self.rendered and not hides_original(item)
 
     def _fitted(self, item: bpy.types.Object, bsdfs: dict[int, str]) -> dict[int, int]:
         """The slots of an object that are fitted, with the numbers of their targets."""
