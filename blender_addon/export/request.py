@@ -109,8 +109,7 @@ def _material(material: Material, files: SceneFiles, *, seen: bool) -> dict[str,
     shader = {"null": "transparent", "emission": "emission"}.get(material.model, material.shader)
     if shader != "principled":
         described["shader"] = shader
-    if material.displaced:
-        described["displaced"] = True
+    described |= {name: True for name in ("displaced", "turned") if getattr(material, name)}
     if material.is_mixed:
         described["weight"] = _socket(material.weight, files, seen)
     extra: dict[str, Any] = {"free": dict(material.free), "factors": list(material.factors)}

@@ -111,6 +111,7 @@ class Baked:
             leaf["walks"],
             normal=normal,
             displaced=normal is not None and bool(leaf["displaced"]),
+            turned=normal is not None and bool(leaf["turned"]),
             shader=leaf.get("shader", kind.shader),
         )
 

@@ -9,7 +9,6 @@ from dataclasses import replace
 import bpy
 import numpy as np
 
-from ...probe.graph_copy import GROUP
 from ...versions import PRINCIPLED, cycles_settings, node_tree_of
 from ..audit.rules import name_settings
 from ..audit.shading_table import MATERIAL, MATERIAL_CYCLES
@@ -30,7 +29,7 @@ from ..nodes.leaf_kinds import (
     only_nearest,
     walks_of,
 )
-from ..nodes.shader_graph import UnsupportedNodeError, plain_value, read_socket, source_of
+from ..nodes.shader_graph import UnsupportedNodeError, is_of_normal_map, plain_value, read_socket, source_of
 from ..nodes.target_shader import (
     DIRECTIONS,
     Place,
@@ -233,18 +232,8 @@ def _read_direction(name: str, place: Place, material: str, findings: Findings) 
     by_graph = source is not None and not (name == "Tangent" and is_uv_tangent(source.node))
     if by_graph:
         refuse_link(name, place, material, findings, is_copied=True)
-    turned = by_graph and _maker(source).bl_idname == "ShaderNodeNormalMap"
+    turned = by_graph and is_of_normal_map(source)
     return Socket(plain_value(socket), source is not None, by_graph=by_graph, turned=turned)
-
-
-def _maker(source: bpy.types.NodeSocket) -> bpy.types.Node:
-    """The node that makes what an output gives, inside of groups where it is a group's."""
-    node = source.node
-    if node.bl_idname != GROUP or node.node_tree is None:
-        return node
-    end = next((n for n in node.node_tree.nodes if n.bl_idname == "NodeGroupOutput" and n.is_active_output), None)
-    inner = None if end is None else source_of(end.inputs[source.identifier])
-    return node if inner is None or inner.node.bl_idname == "NodeGroupInput" else _maker(inner)
 
 
 def name_material_settings(material: bpy.types.Material, findings: Findings) -> None:

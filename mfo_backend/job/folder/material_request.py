@@ -14,7 +14,11 @@ from .mix_request import MIX_KEYS, MixFactor, MixWay, check_mix, factors_from_js
 
 MOST_LEAVES = 64  # of a mix
 OTHER_LEAVES = ("transparent", "emission")
-_MATERIAL_KEYS = ("name", "distribution", "subsurface_method", "sockets", "shader", "weight", "leaves", "displaced")
+_NORMAL_KEYS = ("displaced", "turned")  # of what a `normalmap` over it has
+_MATERIAL_KEYS = (
+    *("name", "distribution", "subsurface_method", "sockets", "shader", "weight", "leaves"),
+    *_NORMAL_KEYS,
+)
 _FILES = ("texture", "graph", "elsewhere")  # of a socket
 
 
@@ -41,7 +45,7 @@ class Material:
     Colours are linear Rec.709. A mix has the `weight` of its fitted material and the other `leaves` with theirs, among
     them what is "transparent" (Base Color passes straight through) and "emission" (Emission Color and Strength). Values
     inside nodes change sockets or weight of one that `varies`. The `normalmap` over one that is `displaced` has normals
-    that take the place of the mesh's smooth ones.
+    that take the place of the mesh's smooth ones, and over one that is `turned` as a socket's are.
     """
 
     name: str
@@ -56,6 +60,7 @@ class Material:
     ways: tuple[MixWay, ...] = ()
     varies: bool = False
     displaced: bool = False
+    turned: bool = False
 
     @property
     def graph_names(self) -> list[str]:
@@ -112,6 +117,7 @@ def _shader(data: Any, where: str, shaders: Sequence[str]) -> Material:
         ways=ways_from_json(material),
         varies=material.boolean("varies", False),
         displaced=material.boolean("displaced", False),
+        turned=material.boolean("turned", False),
         leaves=tuple(_shader(leaf, f"{where}.leaves[{k}]", (*SHADERS, *OTHER_LEAVES)) for k, leaf in enumerate(leaves)),
     )
 
@@ -134,7 +140,7 @@ def without_nothing(material: dict[str, Any]) -> None:
                 del socket[key]
         if not socket["turned"]:
             del socket["turned"]
-    for key in ("displaced", *MIX_KEYS):
+    for key in (*_NORMAL_KEYS, *MIX_KEYS):
         if not material[key]:
             del material[key]
     for leaf in material["leaves"]:

@@ -1,9 +1,10 @@
 # SPDX-License-Identifier: Apache-2.0
 """The Mitsuba texture `mapped_normal`: the normal of a map in the frame of a surface's UV, as a direction of the world.
 
-Choose the variant before importing this. Its one property is the texture `map`, whose colours are (n + 1) / 2 with the
-third axis along the smooth normal and the first along u, as for Mitsuba's BSDF `normalmap`. It is for the property
-`normal` of `blender_principled`, which knows what Cycles does beside a turned normal and `normalmap` does not.
+Choose the variant before importing this. Its properties are the texture `map`, whose colours are (n + 1) / 2 with the
+third axis along the smooth normal and the first along u, as for Mitsuba's BSDF `normalmap`, and the boolean `turned`,
+as that of `projective`. It is for the property `normal` of `blender_principled`, which knows what Cycles does beside a
+bent normal and `normalmap` does not.
 """
 
 # pyright: reportArgumentType=false, reportCallIssue=false, reportOperatorIssue=false
@@ -20,13 +21,12 @@ PLUGIN_NAME = "mapped_normal"
 
 
 class MappedNormal(mi.Texture):
-    """A normal map as directions, which are those of the mesh's front; on its back they are mirrored."""
-
-    turned = False  # as a Bump on a back face, and not as a Normal Map: a bake does not tell them apart
+    """A normal map as directions, which are those of the mesh's front; on its back they are mirrored or `turned`."""
 
     def __init__(self, props: mi.Properties) -> None:
         mi.Texture.__init__(self, props)
         self.map: Any = props["map"]
+        self.turned = bool(props.get("turned", False))  # as a Normal Map on a back face, and not as a Bump
 
     def traverse(self, callback: Any) -> None:
         """Show the map."""

@@ -91,8 +91,11 @@ def _put_normal_maps(scene: Element, materials: Materials) -> None:
         for child in list(bsdf):
             bsdf.remove(child)
         bsdf.extend(copy.deepcopy(child) for child in below)
-        name = "shading_normal" if materials.get(below.get("id", ""), {}).get("displaced") else "normal"
+        content = materials.get(below.get("id", ""), {})
+        name = "shading_normal" if content.get("displaced") else "normal"
         direction = ElementTree.SubElement(bsdf, "texture", type="mapped_normal", name=name)
+        if content.get("turned"):
+            ElementTree.SubElement(direction, "boolean", name="turned", value="true")
         normals.attrib["name"] = "map"
         direction.append(normals)
 

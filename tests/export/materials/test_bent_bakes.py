@@ -145,3 +145,35 @@ def test_a_displacement_by_bump_takes_the_place_of_the_smooth_normal_and_a_bump_
     found = np.mean(render_job(job, 64, "roughness"), axis=0)
     assert expected.mean() > 0.5  # the slope faces the sun; flat it is 0.28
     assert found.mean() == pytest.approx(expected.mean(), rel=0.01)
+
+
+@pytest.mark.parametrize("kind", ["NormalMap", "Bump"])
+@pytest.mark.parametrize("is_behind", [False, True])
+def test_normals_of_a_floor_that_is_seen_from_behind(
+    scene: Any, export: Any, render_cycles: Any, kind: str, is_behind: bool
+) -> None:
+    """Cycles turns those of a Normal Map round on back faces: a floor with its normals down was 16 % too bright."""
+    scene.cycles.samples = 256
+    add_camera("ORTHO", ortho_scale=4.0)
+    add_light("SUN", rotation=(0.0, 0.9, 0.3), energy=3.0)
+    floor, target = add_quad("Floor", 4.0, 0.0, new_material("Floor")), add_quad("T", 0.5, 1.0, new_material("T"))
+    floor.data.uv_layers.new(name="UVMap")
+    nodes = Nodes(floor.data.materials[0])
+    normal = nodes.new(kind)
+    if kind == "NormalMap":
+        normal.inputs["Color"].default_value = (0.7, 0.6, 0.95, 1.0)
+    else:
+        separate = nodes.new("SeparateXYZ")
+        nodes.tree.links.new(nodes.new("NewGeometry").outputs["Position"], separate.inputs[0])
+        nodes.tree.links.new(separate.outputs["X"], normal.inputs["Height"])
+        normal.inputs["Distance"].default_value = 0.5
+    nodes.tree.links.new(normal.outputs[0], nodes.principled.inputs["Normal"])
+    if is_behind:
+        floor.data.flip_normals()
+    bpy.context.view_layer.update()
+    theirs = render_cycles()
+    report = export(target, reference=bpy.data.images.new("Any", 32, 32))
+    ours = np.mean(render_job(report.folder, 256), axis=0)
+    assert ours[:8].mean() == pytest.approx(theirs[:8].mean(), rel=0.01)
+    turned = [m.get("turned", False) for m in report.request["materials"].values()]
+    assert any(turned) == (kind == "NormalMap")
