@@ -165,6 +165,11 @@ class ClosureTree(mi.BSDF):
         return replace(found, weight=found.weight * leaf.weight_at(si, active))
 
     @property
+    def walked(self) -> BlenderPrincipled:
+        """The material that light walks below."""
+        return (self.walking or self.fitted).material
+
+    @property
     def model(self) -> Any:
         """The fitted material's switches."""
         return self.fitted.material.model

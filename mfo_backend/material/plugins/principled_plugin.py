@@ -35,7 +35,7 @@ from ...types.parameter import Value
 from ..arrays.clamp import saturate
 from ..cycles_model import CyclesModel, cycles_model
 from ..principled.blender_principled import evaluate
-from ..principled.bumped_normals import BUMPED_NORMALS, valid_normal
+from ..principled.bumped_normals import BUMPED_NORMALS, BumpedNormals, valid_normal
 from ..principled.layers import Layers, layer_stack, sampled_emission
 from ..principled.lobe_sampling import NAMES, LobeChoice, is_diffuse, lobe_choice, pdf, sample
 from ..principled.needed_lobes import Lobes, needed_lobes
@@ -168,9 +168,24 @@ class BlenderPrincipled(mi.BSDF):
         """Whether light walks below the surface."""
         return self.lobes.dielectric and self.lobes.subsurface
 
+    @property
+    def walked(self) -> BlenderPrincipled:
+        """Itself, which light walks below."""
+        return self
+
     def below(self, si: mi.SurfaceInteraction3f, active: Any) -> Below | None:
         """What the view finds below a surface point; None of a material without."""
         return self.layers_at(si, active).layers.below
+
+    def leaving(self, si: mi.SurfaceInteraction3f, active: Any) -> BumpedNormals | None:
+        """World directions of the normals by which light is lit that leaves from below; None where nodes give none.
+
+        `si.wi` is the way on which it leaves. Cycles keeps a normal that would mirror it into the surface from that.
+        """
+        if not {"normal", "shading_normal"} & set(self.directions):
+            return None
+        normals = self.normals_at(si, active)
+        return BumpedNormals(normals["smooth_normal"], normals["normal"], normals["normal"], self.model.bumps_shade)
 
     @property
     def opened(self) -> tuple[str, ...]:

@@ -34,7 +34,7 @@ from ..lobes.toon import ToonLobe
 from .bumped_normals import BumpedNormals, about
 from .needed_lobes import Lobes
 from .principled_parameters import BLENDER_PRINCIPLED
-from .random_walk import Below
+from .random_walk import LEAST_PATH, Below
 
 # A Glossy BSDF narrows alpha by up to 1 - 0.99 where a Principled BSDF's `anisotropic` of 1 leaves sqrt(0.1)
 GLOSSY_ANISOTROPY = (1.0 - 0.01**2) / 0.9
@@ -298,8 +298,9 @@ def _add_plastic(
     colour = at_least(p["base_color"], 0)
     if lobes.subsurface:
         amount = saturate(p["subsurface_weight"])
-        stack |= {"below": Below.of(p, w * amount, n, model), "subsurface": w * base * amount}
-        w = w * (1 - amount)
+        walks = w * amount * dr.select(p["subsurface_radius"] * p["subsurface_scale"] < LEAST_PATH, 0, 1)
+        stack |= {"below": Below.of(p, walks, n, model), "subsurface": base * walks}
+        w = w - walks  # a channel without a radius has a diffuse lobe in its place
     stack |= {"diffuse": w * colour, "base": colour}
     if lobes.diffuse_roughness and model.diffuse_roughness:
         stack["diffuse_roughness"] = saturate(p["diffuse_roughness"])

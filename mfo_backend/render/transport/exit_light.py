@@ -17,6 +17,7 @@ import mitsuba as mi
 import numpy as np
 
 from ...material.arrays.own_memory import own_memory
+from ...material.principled.bumped_normals import BumpedNormals
 from ...material.principled.random_walk import WALK
 from ...types.light_paths import LightPaths
 from ..lamps.met_lamps import DELTA, SceneLamps
@@ -60,6 +61,8 @@ def light_from_below(
             continue
         entered = dr.gather(mi.SurfaceInteraction3f, si, lane)
         below = material.below(entered, mi.Bool(True))
+        if material.walked.directions:
+            entered.sh_frame, entered.wi, _ = material.walked.bumped_frame(entered, mi.Bool(True))
         entered.sh_frame.n = dr.mulsign(entered.sh_frame.n, entered.wi.z)
         entered.wi.z = dr.abs(entered.wi.z)
         random = PathRandom.of(lane, dr.gather(mi.UInt32, seed, lane) + walks)
@@ -75,6 +78,34 @@ def light_from_below(
         dr.scatter(total, light, dr.gather(mi.UInt32, lane, out), mode=dr.ReduceMode.Permute)
     dr.eval(total)
     return total
+
+
+class _Bumps:
+    """What bumps beside those where light leaves keep from it, where nodes give normals."""
+
+    def __init__(self, of_lanes: list[tuple[mi.Bool, BumpedNormals]]) -> None:
+        self._of = of_lanes
+
+    def left(self, direction: mi.Vector3f) -> mi.Float:
+        """The share that is left of light from a direction of the world."""
+        share = mi.Float(1)
+        for here, normals in self._of:
+            left = dr.select(normals.lit(normals.diffuse, direction), normals.terminator(direction), 0.0)
+            share = dr.select(here, left, share)
+        return share
+
+
+def _lit_by_bumps(scene: mi.Scene, si: mi.SurfaceInteraction3f) -> tuple[mi.SurfaceInteraction3f, _Bumps]:
+    """The places where walks leave with the normals that nodes give there (kernel/integrator/subsurface.h)."""
+    of_lanes, leaving, towards = [], mi.SurfaceInteraction3f(si), si.to_world(si.wi)
+    for material in materials_with_below(scene):
+        here = si.is_valid() & (si.bsdf() == mi.BSDFPtr(material))
+        normals = material.walked.leaving(si, here)
+        if normals is not None:
+            of_lanes.append((here, normals))
+            leaving.sh_frame = dr.select(here, mi.Frame3f(normals.diffuse), leaving.sh_frame)
+    leaving.wi = leaving.to_local(towards)
+    return leaving, _Bumps(of_lanes)
 
 
 def exit_light(
@@ -94,6 +125,7 @@ def exit_light(
     emitters = list(scene.emitters())
     extended = [k for k, e in enumerate(emitters) if not mi.has_flag(e.flags(), DELTA)]
     total = mi.Color3f(0)
+    si, bumps = _lit_by_bumps(scene, si)
 
     def sent(ds: mi.DirectionSample3f, value: mi.Color3f) -> tuple[mi.Color3f, mi.Float]:
         """What is sent on of a light sample, and the density of its direction; 0 where no direction finds it."""
@@ -101,7 +133,7 @@ def exit_light(
         lit = (ds.pdf > 0.0) & (wo.z > 0.0) & (dr.max(value) > 0.0)
         likely = mi.warp.square_to_cosine_hemisphere_pdf(wo)
         passed = shadows.passed(si, ds, lit)
-        value = value * shadows.left(passed) * (likely * shadows.terminator.bend(si, wo, lit))
+        value = value * shadows.left(passed) * (likely * shadows.terminator.bend(si, wo, lit) * bumps.left(ds.d))
         # what comes straight through a surface is left to light samples: after `before`, `cycles_path` adds none of it
         return dr.select(lit, value, 0.0), dr.select(passed.alpha, 0.0, likely)
 
@@ -137,5 +169,6 @@ def exit_light(
         if again:
             far = seen_side(scene, far)
             seen += light_from_below(scene, again, far, valid, sampler, light_paths, depth - 1, walks + 1)
-    total += dr.select(valid, seen * shadows.terminator.bend(si, wo, valid), 0.0)
+    seen *= shadows.terminator.bend(si, wo, valid) * bumps.left(si.to_world(wo))
+    total += dr.select(valid, seen, 0.0)
     return dr.select(dr.all(dr.isfinite(total)), total, 0.0)

@@ -194,3 +194,30 @@ def test_wax_behind_a_cut_out(scene: Any, export: Any, render_cycles: Any, mitsu
     found = np.mean([renderer.image(renderer.start, seed=seed, spp=SAMPLES) for seed in range(RECORDINGS)], axis=0)
     open_half = slice(12, 20), slice(17, 22)
     np.testing.assert_allclose(found[open_half].mean(axis=(0, 1)), wanted[open_half].mean(axis=(0, 1)), rtol=0.03)
+
+
+@pytest.mark.parametrize("tilt", [0.12, -0.12])
+@pytest.mark.parametrize("method", ["RANDOM_WALK", "RANDOM_WALK_SKIN", "BURLEY"])
+def test_light_leaves_by_the_normal_that_nodes_give(
+    scene: Any, export: Any, render_cycles: Any, tilt: float, method: str
+) -> None:
+    """Of a slab under a slanting lamp: with the mesh's own normals it was twice as bright, or a third too dark."""
+    lit(scene)
+    material = new_material("Wax", **{**VALUES, "Subsurface_Scale": 0.02, "Specular_IOR_Level": 0.0})
+    principled(material).subsurface_method = method
+    tree = material.node_tree
+    tilted = tree.nodes.new("ShaderNodeNormalMap")
+    tilted.inputs["Color"].default_value = (0.5 + tilt, 0.5, 0.9, 1.0)
+    tree.links.new(tilted.outputs[0], principled(material).inputs["Normal"])
+    bpy.ops.mesh.primitive_cube_add(size=2.0, scale=(1.0, 1.0, 0.3))
+    bpy.context.object.data.materials.append(material)
+    same_level(export, render_cycles, bpy.context.object)
+
+
+@pytest.mark.parametrize("method", ["RANDOM_WALK", "RANDOM_WALK_SKIN", "BURLEY"])
+def test_a_channel_without_a_radius_is_diffuse(scene: Any, export: Any, render_cycles: Any, method: str) -> None:
+    """Red of icing whose Subsurface Radius begins with zero was half as bright as it should be."""
+    lit(scene)
+    material = new_material("Icing", Subsurface_Radius=(0.0, 0.09, 0.09), **{**VALUES, "Subsurface_Scale": 0.1})
+    principled(material).subsurface_method = method
+    same_level(export, render_cycles, ball(material))
