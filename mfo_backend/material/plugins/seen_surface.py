@@ -17,6 +17,7 @@ from ..arrays.own_memory import own_memory
 
 NOWHERE = 0xFFFFFFFF
 RINGS = 2  # subpixels beside the surface that take their neighbours' value: samples may miss what a ray meets
+BESIDE = 8  # subpixels beside the picture that take the value of the nearest one in it: two pixels of the finest
 # A point is seen where it is as near to what the camera saw there as neighbours are to each other, twice, or as this
 # share of the surface's extent
 NEAR_NEIGHBOURS, NEAR_EXTENT = 2.0, 1e-3
@@ -78,25 +79,31 @@ class SeenSurface:
         inverse = dr.rcp(w)
         column, row = dr.floor(column * inverse), dr.floor(row * inverse)
         width, height = dr.opaque(mi.Float, self.width), dr.opaque(mi.Float, self.height)
-        inside = active & (w > 0) & (column >= 0) & (column < width) & (row >= 0) & (row < height)
-        first = mi.UInt32(dr.select(inside, row, 0)) * mi.UInt32(width) + mi.UInt32(dr.select(inside, column, 0))
+        # pixels at the picture's edge show what their filter finds beside it
+        near_column, near_row = dr.clip(column, 0, width - 1), dr.clip(row, 0, height - 1)
+        beside = dr.maximum(dr.abs(column - near_column), dr.abs(row - near_row))
+        inside = active & (w > 0) & (beside <= BESIDE)
+        first = mi.UInt32(dr.select(inside, near_row, 0)) * mi.UInt32(width)
+        first += mi.UInt32(dr.select(inside, near_column, 0))
         # at a rim one subpixel holds both sides, each within the other's reach
-        source, seen, nearest = self._at(first, point, inside)
+        source, seen, nearest = self._at(first, point, beside, inside)
         for depth in range(1, self.depths):
             below = dr.opaque(mi.UInt32, depth * self.height * self.width)
-            here, is_here, apart = self._at(first + below, point, inside)
+            here, is_here, apart = self._at(first + below, point, beside, inside)
             is_nearer = is_here & (~seen | (apart < nearest))
             source, nearest = dr.select(is_nearer, here, source), dr.select(is_nearer, apart, nearest)
             seen |= is_here
         return source, seen
 
-    def _at(self, index: mi.UInt32, point: mi.Point3f, active: Any) -> tuple[mi.UInt32, mi.Bool, mi.Float]:
-        """The same at one depth, where `index` is the subpixel that the point projects to, and how far from there the
-        camera saw the surface."""
+    def _at(
+        self, index: mi.UInt32, point: mi.Point3f, beside: mi.Float, active: Any
+    ) -> tuple[mi.UInt32, mi.Bool, mi.Float]:
+        """The same at one depth, where `index` is the subpixel that the point projects to, or so many `beside` the
+        nearest of the picture, and how far from there the camera saw the surface."""
         source = dr.gather(mi.UInt32, self._source, index, active)
         known = active & (source != NOWHERE)
         apart = dr.norm(dr.gather(mi.Point3f, self._positions, index, known) - point)
-        return source, known & (apart <= dr.gather(mi.Float, self._reach, index, known)), apart
+        return source, known & (apart <= dr.gather(mi.Float, self._reach, index, known) * (1 + beside)), apart
 
 
 def _eye_of(camera: NDArray[np.float64]) -> NDArray[np.float64]:

@@ -67,8 +67,14 @@ def test_just_beside_the_surface_a_neighbour_counts(texture: Any) -> None:
 
 
 def test_behind_it_beside_it_and_outside_of_the_picture_nothing_is_seen(texture: Any) -> None:
-    found = at(texture, (1.5, 1.5, 40.0), (5.9, 1.5, 0.0), (-0.5, 1.5, 0.0), (1.5, 4.5, 0.0))
+    found = at(texture, (1.5, 1.5, 40.0), (5.9, 1.5, 0.0), (-9.5, 1.5, 0.0), (1.5, 13.5, 0.0))
     np.testing.assert_array_equal(found, [[7, 8, 9]] * 4)
+
+
+def test_beside_the_picture_the_surface_goes_on(texture: Any) -> None:
+    """As far as a pixel filter looks, where it is about as far from what the picture shows at its edge."""
+    found = at(texture, (-0.5, 1.5, 0.0), (1.5, 7.5, 0.0), (-1.5, -0.5, 0.0), (-0.5, 1.5, 9.0))
+    np.testing.assert_array_equal(found, [[0, 1, 10], [1, 3, 31], [0, 0, 0], [7, 8, 9]])
 
 
 def test_other_values_have_their_own_for_what_is_not_seen(texture: Any) -> None:
