@@ -59,14 +59,20 @@ class Outputs:
 
 
 def frame_of(
-    scene: bpy.types.Scene, obj: bpy.types.Object, scale: int, outputs: int, region: Region | None = None
+    scene: bpy.types.Scene,
+    obj: bpy.types.Object,
+    material: bpy.types.Material,
+    scale: int,
+    outputs: int,
+    region: Region | None = None,
 ) -> Frame | None:
-    """The frame around `obj` with at most `scale` subpixels along a pixel, less where the AOVs would be too large.
+    """The frame around `obj`, and whatever else shows the material, with at most `scale` subpixels along a pixel.
 
-    The picture may show a `region` of it alone. None where all of it is beside the picture or behind the camera.
+    Less where the AOVs would be too large. The picture may show a `region` of it alone. None where all of it is beside
+    the picture or behind the camera.
     """
     size = square_size(scene.render)
-    bounds = _bounds(scene, obj, size, region or Region(0, 0, *size))
+    bounds = _bounds(scene, obj, material, size, region or Region(0, 0, *size))
     if bounds is None:
         return None
     left, top, right, bottom = bounds
@@ -223,11 +229,23 @@ def _joined(channels: dict[str, NDArray[np.float32]], name: str) -> NDArray[np.f
     return np.stack([parts[key] for key in order], axis=-1)
 
 
+def shows(instance: bpy.types.DepsgraphObjectInstance, material: bpy.types.Material) -> bool:
+    """Whether an instance has a material, perhaps of a mesh that geometry nodes make."""
+    item = instance.object
+    own = [slot.material for slot in item.material_slots]
+    every = [*own, *getattr(item.data, "materials", ())]
+    return any(each is not None and each.original == material for each in every)
+
+
 def _bounds(
-    scene: bpy.types.Scene, obj: bpy.types.Object, size: tuple[int, int], region: Region
+    scene: bpy.types.Scene,
+    obj: bpy.types.Object,
+    material: bpy.types.Material,
+    size: tuple[int, int],
+    region: Region,
 ) -> tuple[int, int, int, int] | None:
-    """Left, top, right and bottom of the pixels of a region that can see `obj`; all where it reaches behind the camera,
-    None where there are none."""
+    """Left, top, right and bottom of the pixels of a region that can see `obj` or the material; all where one of them
+    reaches behind the camera, None where there are none."""
     width, height = size
     margin = int(FILTER_MARGIN)
     whole = (
@@ -240,7 +258,7 @@ def _bounds(
     depsgraph = bpy.context.evaluated_depsgraph_get()
     for instance in depsgraph.object_instances:
         owner = instance.parent if instance.is_instance else instance.object
-        if owner is not None and owner.original == obj:
+        if owner is not None and (owner.original == obj or shows(instance, material)):
             matrix = instance.matrix_world.copy()
             corners += [matrix @ Vector(corner) for corner in instance.object.bound_box]
     if not corners:

@@ -7,7 +7,6 @@ import math
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass, field
-from functools import cached_property
 from typing import Any
 
 import bpy
@@ -77,7 +76,7 @@ class Target:
 
     def frame(self, scale: int, outputs: int) -> Frame:
         """See `frame_of`; raises `NotSeenError` where there is none."""
-        frame = frame_of(self.scene, self.obj, scale, outputs, self.region)
+        frame = frame_of(self.scene, self.obj, self.material, scale, outputs, self.region)
         if frame is None:
             raise NotSeenError(NOT_SEEN.format(obj=self.obj.name))
         return frame
@@ -112,37 +111,20 @@ class Target:
 
     @contextmanager
     def _standing_in(self, copy: bpy.types.Material) -> Iterator[None]:
-        """Show `copy` for the material: in the object's slot, or wherever it is, where nodes put it on instances."""
+        """Show `copy` for the material: in the object's slot, and wherever else it is, as on meshes of nodes.
+
+        What another file holds keeps the material, but for the slot.
+        """
         material, was_link = self.slot.material, self.slot.link
-        if self._is_on_instances_of_nodes:
-            material.user_remap(copy)
-            try:
-                yield
-            finally:
-                copy.user_remap(material)
-            return
         try:
-            self.slot.link = "OBJECT"  # the mesh may belong to other objects too
+            self.slot.link = "OBJECT"
             self.slot.material = copy
+            material.user_remap(copy)
             yield
         finally:
+            copy.user_remap(material)
             self.slot.material = material
             self.slot.link = was_link
-
-    @cached_property
-    def _is_on_instances_of_nodes(self) -> bool:
-        """Whether geometry nodes make meshes with the material, which the object's slot does not change."""
-        if all(modifier.type != "NODES" for modifier in self.obj.modifiers):
-            return False
-        depsgraph = bpy.context.evaluated_depsgraph_get()
-        own = self.obj.evaluated_get(depsgraph).data
-        return any(
-            instance.is_instance
-            and instance.object.original == self.obj
-            and instance.object.data != own
-            and any(each is not None and each.original == self.material for each in instance.object.data.materials)
-            for instance in depsgraph.object_instances
-        )
 
 
 def from_origin(camera: NDArray[np.float64], origin: NDArray[np.float64]) -> NDArray[np.float64]:

@@ -253,3 +253,53 @@ def test_nothing_is_left_in_the_temporary_folder() -> None:
     import tempfile
 
     assert not list(Path(tempfile.gettempdir()).glob(f"material_fit_probe_{os.getpid()}_*"))
+
+
+@pytest.mark.parametrize("kind", ["colours", "normals"])
+def test_another_object_of_the_material_shows_what_its_nodes_give_there(
+    scene: Any, export: Any, render_cycles: Any, kind: str
+) -> None:
+    """A ball beside the target, of the same material: it had the mean colour of the target, and no bumps."""
+    lit_scene(scene)
+    scene.cycles.samples = 256
+    material = new_material("Shared", Roughness=0.8)
+    tree = material.node_tree
+    if kind == "colours":
+        separate, right = tree.nodes.new("ShaderNodeSeparateXYZ"), tree.nodes.new("ShaderNodeMath")
+        right.operation = "GREATER_THAN"
+        tree.links.new(tree.nodes.new("ShaderNodeNewGeometry").outputs["Position"], separate.inputs[0])
+        tree.links.new(separate.outputs["X"], right.inputs[0])
+        tree.links.new(right.outputs[0], principled(material).inputs["Base Color"])
+    else:
+        tilted = tree.nodes.new("ShaderNodeNormalMap")
+        tilted.inputs["Color"].default_value = (0.8, 0.6, 0.85, 1.0)
+        tree.links.new(tilted.outputs[0], principled(material).inputs["Normal"])
+    target, other = ball(material), ball(material)
+    for item, x in ((target, -0.6), (other, 0.6)):
+        item.scale, item.location = (0.5, 0.5, 0.5), (x, 0.0, 0.0)
+    bpy.context.view_layer.update()
+    renderer, wanted = renderer_and_cycles(export, render_cycles, target)
+    found = np.mean([renderer.image(renderer.start, seed=seed, spp=64) for seed in range(4)], axis=0)
+    beside = slice(12, 36), slice(26, 48)
+    assert found[beside].mean() == pytest.approx(wanted[beside].mean(), rel=0.02)
+    assert wanted[beside].mean() > 0.05
+
+
+def test_pixels_at_the_edge_of_the_picture(scene: Any, export: Any, render_cycles: Any) -> None:
+    """Their filter looks beside the picture, where a target that goes on had no bumps: they were 10 to 20 % off."""
+    scene.render.resolution_x = scene.render.resolution_y = 24
+    scene.cycles.pixel_filter_type, scene.cycles.filter_width, scene.cycles.samples = "BLACKMAN_HARRIS", 1.5, 1024
+    add_camera("ORTHO", ortho_scale=2.0)
+    add_light("SUN", rotation=(0.0, 0.8, 0.4), energy=3.0)
+    material = new_material("Slope", Specular_IOR_Level=0.0)
+    tree = material.node_tree
+    tilted = tree.nodes.new("ShaderNodeNormalMap")
+    tilted.inputs["Color"].default_value = (0.9, 0.5, 0.75, 1.0)
+    tree.links.new(tilted.outputs[0], principled(material).inputs["Normal"])
+    target = add_quad("Slope", 4.0, 0.0, material)
+    target.data.uv_layers.new(name="UVMap")
+    bpy.context.view_layer.update()
+    renderer, wanted = renderer_and_cycles(export, render_cycles, target)
+    found = np.mean([renderer.image(renderer.start, seed=seed, spp=256) for seed in range(4)], axis=0)
+    for edge in (np.s_[0], np.s_[-1], np.s_[:, 0], np.s_[:, -1]):
+        assert found[edge].mean() == pytest.approx(wanted[edge].mean(), rel=0.01)
