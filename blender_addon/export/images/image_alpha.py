@@ -21,6 +21,7 @@ from .picture_header import PictureHeader, read_header
 
 MULTIPLIED_FILES = ("OpenEXR", "Radiance HDR", "TIFF", "WebP")  # by what OpenImageIO says of them
 LARGEST_BYTE = 255.0
+DEPTHS_WITH_ALPHA = (32, 64, 128)  # bits of a pixel
 
 Pixels = NDArray[np.float32]
 
@@ -66,6 +67,15 @@ def multiplies(image: bpy.types.Image) -> bool:
 def is_read_by_cycles(image: bpy.types.Image) -> bool:
     """Whether Cycles reads the file of an image itself, and does not ask Blender for pixels."""
     return image.source == "FILE" and image.packed_file is None
+
+
+def reads_alpha_otherwise(image: bpy.types.Image) -> bool:
+    """Whether Open Shading Language, which reads files by itself, may have other colours of an image.
+
+    It multiplies them by alpha whatever the image's Alpha says, and may divide them again after the filter. A floor by
+    a PNG of random alpha was 31 % darker under *None*, by an EXR whose alpha is the roughness 6 % brighter.
+    """
+    return is_read_by_cycles(image) and image.depth in DEPTHS_WITH_ALPHA
 
 
 def _has_alpha(pixels: Pixels) -> bool:

@@ -12,6 +12,7 @@ from ..audit.rules import name_settings
 from ..audit.scene_table import BY_SIMPLIFY, LAYER_COLLECTION, RENDER, SCENE_CYCLES, VIEW_LAYER
 from ..camera.read_camera import read_pixel_filter
 from ..findings import Findings
+from ..images.image_alpha import reads_alpha_otherwise
 from ..images.texture_cache import uses_texture_cache
 from ..meshes.read_mesh import MESH_TYPES
 from ..render_state import layer_collections
@@ -67,6 +68,13 @@ def name_render_settings(scene: bpy.types.Scene, view_layer: bpy.types.ViewLayer
         findings.note(
             "Cycles reads pictures through its texture cache, which averages them where they are small; the fit does "
             "not. Turn Texture Cache off in Render Properties > Performance, and render the reference anew."
+        )
+    cycles = cycles_settings(scene)
+    read = next((image.name for image in bpy.data.images if image.users and reads_alpha_otherwise(image)), None)
+    if cycles is not None and cycles.shading_system and read is not None:
+        findings.note(
+            f"Open Shading Language multiplies the colours of '{read}' by its alpha, and filters them in another way "
+            "than the fit. Turn Open Shading Language off, and render the reference anew."
         )
 
 
