@@ -124,7 +124,7 @@ def _shown_words(rig: Rig, _: Draw) -> None:
         item.location, item.rotation_euler = place, (math.pi / 2, 0.0, 0.0)
         made.objects.link(item)
     empty = bpy.data.objects.new("Words", None)
-    empty.instance_type, empty.instance_collection, empty.location = "COLLECTION", made, (0.9, -1.3, 0.1)
+    empty.instance_type, empty.instance_collection, empty.location = "COLLECTION", made, (0.9, -1.33, 0.1)
     rig.scene.collection.objects.link(empty)
 
 
