@@ -76,6 +76,8 @@ def corners_of(mesh: bpy.types.Mesh) -> tuple[NDArray[np.float32], NDArray[np.in
         corners = np.empty(count * 3, dtype=np.int32)
         mesh.loop_triangles.foreach_get("loops", corners)
     is_smooth = ~_of_faces(mesh, "sharp_face", np.bool_)[_faces(mesh)]
+    if mesh.normals_domain == "FACE" and "sharp_face" not in mesh.attributes:  # as geometry nodes leave it
+        is_smooth[:] = False
     positions = np.empty(len(mesh.vertices) * 3, dtype=np.float32)
     mesh.vertices.foreach_get("co", positions)
     places = positions.reshape(-1, 3)[_vertex_of_corner(mesh)[corners]].reshape(-1, 3, 3)
@@ -114,7 +116,7 @@ def _shading_normals(
     """Normals as Cycles takes them (measured with Blender 4.3, 5.0 and 5.2), at three corners a triangle.
 
     Each triangle of a flat face is flat by itself, also where the face is not plane, unless the mesh has custom
-    normals. Faces that only sharp edges make flat are smooth.
+    normals. Faces that only sharp edges make flat are smooth, unless nothing was ever said of faces (`sharp_face`).
     """
     if mesh.normals_domain == "FACE" or (rounds_beside_flat_faces() and not _splits_vertices(mesh)):
         vertex_normals = np.empty(len(mesh.vertices) * 3, dtype=np.float32)

@@ -318,7 +318,9 @@ def test_mirrored_object_shades_as_in_cycles(scene: Any, export: Any, render_cyc
     assert np.median(np.abs(found - expected)) < 1e-4
 
 
-@pytest.mark.parametrize("kind", ["flat", "flat beside smooth", "custom normals", "sharp edges"])
+@pytest.mark.parametrize(
+    "kind", ["flat", "flat beside smooth", "custom normals", "sharp edges", "sharp edges of faces that never were"]
+)
 def test_a_face_that_is_not_plane_shades_as_in_cycles(
     kind: str, scene: Any, export: Any, render_cycles: Any, render_mitsuba: Any
 ) -> None:
@@ -327,9 +329,12 @@ def test_a_face_that_is_not_plane_shades_as_in_cycles(
     bent = add_mesh("Bent", corners, [(0, 1, 2, 3), (1, 4, 5, 2)], white)
     bent.cycles.shadow_terminator_geometry_offset = 0.0
     first, second = bent.data.polygons
-    first.use_smooth, second.use_smooth = kind == "sharp edges", kind in ("sharp edges", "flat beside smooth")
+    by_edges = kind.startswith("sharp edges")
+    first.use_smooth, second.use_smooth = by_edges, by_edges or kind == "flat beside smooth"
     for edge in bent.data.edges:
-        edge.use_edge_sharp = kind == "sharp edges"
+        edge.use_edge_sharp = by_edges
+    if kind.endswith("never were"):
+        bent.data.attributes.remove(bent.data.attributes["sharp_face"])
     if kind == "custom normals":
         bent.data.normals_split_custom_set([(0.3, 0.0, 1.0)] * 8)
     target = add_quad("Target", 0.05, 2.0, new_material("Target"))
@@ -340,7 +345,7 @@ def test_a_face_that_is_not_plane_shades_as_in_cycles(
     expected, found = render_cycles(), render_mitsuba(export(target))
     # but for the pixels along the diagonal, and the target
     assert np.quantile(np.abs(found - expected), 0.8) < 1e-3
-    if kind.startswith("flat"):
+    if kind.startswith("flat") or kind.endswith("never were"):
         assert expected.max() > 4.0 * np.median(expected[10:, 10:])  # two planes
 
 

@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+from itertools import pairwise
 from typing import Any
 
 import bpy
@@ -44,6 +45,20 @@ def sharp() -> None:
     edges[0].use_edge_sharp = edges[3].use_edge_sharp = True
 
 
+def sharp_by_nodes() -> None:
+    """Smooth by angle, as files before Blender 4.1 become: no face ever had a word of its own."""
+    bpy.ops.mesh.primitive_cube_add()
+    group = bpy.data.node_groups.new("Smooth by Angle", "GeometryNodeTree")
+    for in_out in ("INPUT", "OUTPUT"):
+        group.interface.new_socket("Geometry", in_out=in_out, socket_type="NodeSocketGeometry")
+    nodes = [group.nodes.new(name) for name in ("NodeGroupInput", "GeometryNodeSetShadeSmooth", "NodeGroupOutput")]
+    nodes[1].domain, nodes[1].inputs["Shade Smooth"].default_value = "EDGE", False
+    for before, after in pairwise(nodes):
+        group.links.new(before.outputs[0], after.inputs[0])
+    bpy.context.object.data.attributes.remove(bpy.context.object.data.attributes["sharp_face"])
+    bpy.context.object.modifiers.new("Smooth by Angle", "NODES").node_group = group
+
+
 def custom() -> None:
     smooth()
     mesh = bpy.context.object.data
@@ -64,7 +79,9 @@ def edited() -> None:
     bpy.ops.object.mode_set(mode="EDIT")
 
 
-@pytest.mark.parametrize("build", [flat, smooth, triangles, mixed, sharp, custom, modified, text, edited])
+@pytest.mark.parametrize(
+    "build", [flat, smooth, triangles, mixed, sharp, sharp_by_nodes, custom, modified, text, edited]
+)
 def test_a_mesh_is_what_its_faces_and_corners_say(build: Any, scene: Any) -> None:
     build()
     depsgraph = bpy.context.evaluated_depsgraph_get()
@@ -85,7 +102,7 @@ def test_a_mesh_is_what_its_faces_and_corners_say(build: Any, scene: Any) -> Non
     ]  # fmt: skip
     wanted = np.array(normals, np.float32)
     if not mesh.has_custom_normals:
-        is_smooth = np.array([face.use_smooth for face in faces])
+        is_smooth = np.array([face.use_smooth and build is not sharp_by_nodes for face in faces])
         wanted = np.where(is_smooth[:, None, None], wanted, flat_normals(places))
     layer = next((layer for layer in mesh.uv_layers if layer.active_render), None)
     uvs = [[tuple(layer.uv[k].vector) if layer is not None else (0.0, 0.0) for k in each] for each in corners]
