@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import json
+import re
 import statistics
 from collections import Counter
 from collections.abc import Iterable
@@ -104,6 +105,6 @@ def recovery_table(rows: Iterable[Row]) -> str:
 
 
 def _kind(sentence: str) -> str:
-    """A sentence without the names in it, so that sentences of one kind count together."""
+    """A sentence without the names and numbers in it, so that sentences of one kind count together."""
     parts = sentence.split("'")
-    return "'...'".join(parts[::2]) if len(parts) % 2 else sentence
+    return re.sub(r"\d+(\.\d+)?", "N", "'...'".join(parts[::2]) if len(parts) % 2 else sentence)
