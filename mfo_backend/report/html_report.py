@@ -168,9 +168,8 @@ def _split(pictures: Mapping[str, bytes]) -> str:
 
 
 def _value_table(result: FitResult) -> str:
-    heads = [result.shader or "Parameter", "Initial", "Recovered", "Bounds", "○ initial ● recovered"]
-    if result.certainty:
-        heads.append("How sure")
+    sure = ["How sure"] if result.certainty else []
+    heads = [result.shader or "Parameter", "Recovered", *sure, "Initial", "Bounds", "○ initial ● recovered"]
     table = _table(heads, value_rows(result))
     lines = f"<details><summary>As text, to copy</summary><pre>{escape(as_text(result))}</pre></details>"
     weak = "".join(f"<li>{escape(weak.sentence)}</li>" for weak in result.weak_combinations)

@@ -11,6 +11,7 @@ from ..types.result import StageReport
 
 WIDTH, HEIGHT = 880, 340
 LEFT, RIGHT, TOP, BOTTOM = 64, 16, 34, 44
+LETTER = 8.0  # of a bold letter of 13 pixels, at most
 MOST_POINTS = 600  # about one a pixel; thousands of iterations would only make the file large
 
 
@@ -33,7 +34,7 @@ def loss_plot(stages: Sequence[StageReport]) -> str:
         return TOP + (HEIGHT - TOP - BOTTOM) * (high - math.log10(value)) / (high - low)
 
     parts = [*_grid(low, high, end, x, y)]
-    begin = 0.0
+    begin, free = 0.0, 0.0
     for number, stage in enumerate(stage for stage in stages if stage.curve):
         if number:
             at = f"{x(begin):.1f}"
@@ -41,8 +42,12 @@ def loss_plot(stages: Sequence[StageReport]) -> str:
         # a narrow last stage would push its label over the edge
         anchor = "end" if x(begin) > WIDTH * 0.8 else "start"
         shift = -6 if anchor == "end" else 6
+        place, width = x(begin) + shift, LETTER * len(stage.name)
+        left = place - width if anchor == "end" else place
+        height = TOP - 12 if left >= free else TOP + 16  # below the name of a short stage before it
+        free = max(free, left + width)
         parts.append(
-            f'<text class="stage s{number % 4}" x="{x(begin) + shift:.1f}" y="{TOP - 12}" text-anchor="{anchor}">'
+            f'<text class="stage s{number % 4}" x="{place:.1f}" y="{height}" text-anchor="{anchor}">'
             f"{escape(stage.name)}</text>"
         )
         for kind in ("loss", "best"):

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The values of a material as HTML rows: initial, recovered and where they lie between their bounds."""
+"""The values of a material as HTML rows: recovered, how sure, initial and where they lie between their bounds."""
 
 from __future__ import annotations
 
@@ -46,11 +46,12 @@ def swatch_colour(value: Value) -> str:
 def _row(name: str, result: FitResult) -> str:
     recovered, initial, bounds = result.recovered[name], result.initial.get(name), result.bounds.get(name)
     cells = [f'<th scope="row">{escape(result.labels.get(name) or socket_name(name))}</th>']
-    cells += [f"<td>{_shown(value)}</td>" for value in (initial, recovered)]
+    cells.append(f"<td>{_shown(recovered)}</td>")
+    if result.certainty:
+        cells.append(f'<td class="sentence">{_certainty(result.certainty.get(name))}</td>')
+    cells.append(f"<td>{_shown(initial)}</td>")
     cells.append(f'<td class="bounds">{bounds[0]:.4g} to {bounds[1]:.4g}</td>' if bounds else "<td></td>")
     cells.append(f'<td class="where">{_track(initial, recovered, bounds)}</td>')
-    if result.certainty:
-        cells.append(f"<td>{_certainty(result.certainty.get(name))}</td>")
     return f"<tr>{''.join(cells)}</tr>"
 
 
@@ -67,7 +68,8 @@ def _shown(value: Value | None) -> str:
         return ""
     if len(_components(value)) == 3:
         code = swatch_colour(value)
-        return f'<span class="swatch" style="background:{code}"></span><code>{code}</code> {value_text(value)}'
+        swatch = f'<span class="swatch" style="background:{code}"></span>'
+        return f'{swatch}<code>{code}</code><span class="linear">{value_text(value)}</span>'
     return value_text(value)
 
 

@@ -8,7 +8,7 @@ from xml.etree import ElementTree
 
 import pytest
 
-from mfo_backend.report.loss_plot import BOTTOM, HEIGHT, LEFT, MOST_POINTS, RIGHT, TOP, WIDTH, loss_plot
+from mfo_backend.report.loss_plot import BOTTOM, HEIGHT, LEFT, LETTER, MOST_POINTS, RIGHT, TOP, WIDTH, loss_plot
 from mfo_backend.types.result import CurvePoint, StageReport
 from mfo_backend.types.status import Status
 
@@ -82,3 +82,20 @@ def test_a_long_curve_is_thinned_and_keeps_its_end() -> None:
     (best,) = lines(svg, "best")
     assert len(best) <= MOST_POINTS + 1
     assert best[-1][0] == pytest.approx(WIDTH - RIGHT, abs=0.06)
+
+
+def test_names_of_short_stages_stand_beside_each_other_or_below() -> None:
+    """Each name has its own room, and keeps within the picture; the usual ones of a fit."""
+    ends = [("scan", 3.0), ("start", 3.2), ("refine", 9.0), ("itp", 9.5)]
+    begins = [0.0, *(end for _, end in ends)]
+    made = [stage(n, [(b, 1.0, 1.0), (e, 0.5, 0.5)]) for (n, e), b in zip(ends, begins, strict=False)]
+    rooms = []
+    for text in ElementTree.fromstring(loss_plot(made)).iter("text"):
+        if "stage" in text.get("class", ""):
+            x, width = float(text.get("x", "")), LETTER * len(text.text or "")
+            left = x - width if text.get("text-anchor") == "end" else x
+            rooms.append((left, left + width, text.get("y")))
+    assert [y for _, _, y in rooms].count(rooms[0][2]) == 3
+    for k, (left, right, y) in enumerate(rooms):
+        assert LEFT <= left < right <= WIDTH
+        assert all(right <= other[0] or other[1] <= left for other in rooms[k + 1 :] if other[2] == y)
