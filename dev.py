@@ -6,7 +6,7 @@
     python3 dev.py test       check and test everything; test --quick: what has no fit and no Blender, in a minute;
                               test --bpy 4.2 (or 4.5): the add-on with another bpy module
     python3 dev.py mfo ...    the `mfo` command of this checkout
-    python3 dev.py package    build the extension zip and a static extension repository into dist/
+    python3 dev.py package    build the extension zip and a static extension repository into dist/, list what is in it
     python3 dev.py lock       resolve the dependencies again and rewrite requirements/*.lock
 
 Everything lives in `.venv` beside this file; a second call finds it there and starts at once. Standard library only.
@@ -23,6 +23,7 @@ import subprocess
 import sys
 import tempfile
 import time
+import zipfile
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parent
@@ -264,6 +265,7 @@ def package() -> int:
     blender = os.environ.get("MFO_BLENDER", "").split(os.pathsep)[0] or shutil.which("blender")
     if not blender:  # the bpy module lacks the command
         run(venv_program("python"), ROOT / "tools" / "extension_repository.py")
+        list_contents()
         say("built without Blender; with one (MFO_BLENDER) the zip is validated too")
         return 0
     (ROOT / "dist").mkdir(exist_ok=True)
@@ -272,7 +274,21 @@ def package() -> int:
     for archive in sorted((ROOT / "dist").glob("*.zip")):
         run(*extension, "validate", archive)
     run(*extension, "server-generate", "--repo-dir", ROOT / "dist")
+    list_contents()
     return 0
+
+
+def list_contents() -> None:
+    """Say what each zip in dist/ holds: the files and kilobytes of every folder and file at its top."""
+    for archive in sorted((ROOT / "dist").glob("*.zip")):
+        say(f"{archive.name}, {archive.stat().st_size / 1000:.0f} kB packed:")
+        inside: dict[str, list[int]] = {}
+        with zipfile.ZipFile(archive) as opened:
+            for each in opened.infolist():
+                if not each.is_dir():
+                    inside.setdefault(each.filename.split("/")[0], []).append(each.file_size)
+        for name, sizes in sorted(inside.items()):
+            say(f"  {name:24} {len(sizes):4} {'file' if len(sizes) == 1 else 'files'} {sum(sizes) / 1000:7.0f} kB")
 
 
 def lock() -> int:

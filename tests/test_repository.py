@@ -8,7 +8,9 @@ import os
 import re
 import subprocess
 import sys
+import zipfile
 from pathlib import Path
+from types import ModuleType
 
 import pytest
 
@@ -105,10 +107,29 @@ def test_no_test_reads_an_exr_file_with_one_thread() -> None:
     assert found == []
 
 
-def test_the_quick_tests_exist() -> None:
+@pytest.fixture
+def dev() -> ModuleType:
     spec = importlib.util.spec_from_file_location("dev", ROOT / "dev.py")
     assert spec is not None
     assert spec.loader is not None
-    dev = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(dev)
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    return module
+
+
+def test_the_quick_tests_exist(dev: ModuleType) -> None:
     assert [path for path in dev.QUICK if not (ROOT / path).exists()] == []
+
+
+def test_what_a_zip_holds_is_listed(
+    dev: ModuleType, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    (tmp_path / "dist").mkdir()
+    with zipfile.ZipFile(tmp_path / "dist" / "made.zip", "w") as archive:
+        for name, size in (("LICENSE", 1200), ("addon/a.py", 3000), ("addon/pictures/b.png", 5400)):
+            archive.writestr(name, b" " * size)
+    monkeypatch.setattr(dev, "ROOT", tmp_path)
+    dev.list_contents()
+    said = [line.split() for line in capsys.readouterr().err.splitlines()]
+    assert said[0][:2] == ["dev.py:", "made.zip,"]
+    assert [line[1:] for line in said[1:]] == [["LICENSE", "1", "file", "1", "kB"], ["addon", "2", "files", "8", "kB"]]
