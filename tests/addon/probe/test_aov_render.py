@@ -26,42 +26,65 @@ def scene() -> Any:
     scene.collection.objects.link(camera)
     scene.camera = camera
     bpy.ops.mesh.primitive_plane_add(size=2.0, location=(2.0, 1.0, 0.0))
+    bpy.context.object.data.materials.append(bpy.data.materials.new("Square"))
     bpy.context.view_layer.update()
     return scene
 
 
+def frame(scene: Any, scale: int, outputs: int, region: Region | None = None) -> Any:
+    """The frame around the square and whatever else shows its material."""
+    item = bpy.context.object
+    return frame_of(scene, item, item.active_material, scale, outputs, region)
+
+
 def test_the_frame_is_the_object_and_two_pixels_around(scene: Any) -> None:
-    frame = frame_of(scene, bpy.context.object, 4, 1)
+    around = frame(scene, 4, 1)
     left, right, top, bottom = 60, 80, 30, 50
-    found = (frame.left, frame.right, frame.top, frame.bottom)
+    found = (around.left, around.right, around.top, around.bottom)
     wanted = [4 * v for v in (left - 2, right + 2, top - 2, bottom + 2)]
     assert found == pytest.approx(wanted, abs=4.0)  # a corner may round to the next pixel
-    assert (frame.scale, frame.full) == (4, (400, 400))
+    assert (around.scale, around.full) == (4, (400, 400))
+
+
+@pytest.mark.parametrize("is_linked_to", ["DATA", "OBJECT"])
+def test_the_frame_is_around_all_that_shows_the_material(scene: Any, is_linked_to: str) -> None:
+    square = bpy.context.object
+    alone = frame(scene, 4, 1)
+    bpy.ops.mesh.primitive_plane_add(size=2.0, location=(-3.0, 1.0, 0.0))
+    other, bpy.context.view_layer.objects.active = bpy.context.object, square
+    bpy.context.view_layer.update()
+    assert frame(scene, 4, 1) == alone  # of no material
+    other.data.materials.append(None)
+    other.material_slots[0].link = is_linked_to
+    other.material_slots[0].material = square.active_material
+    bpy.context.view_layer.update()
+    both = frame(scene, 4, 1)
+    assert both.left == pytest.approx(4 * (10 - 2), abs=4.0)
+    assert (both.right, both.top, both.bottom) == (alone.right, alone.top, alone.bottom)
 
 
 def test_a_region_of_the_picture_bounds_the_frame(scene: Any) -> None:
-    frame = frame_of(scene, bpy.context.object, 4, 1, Region(0, 40, 70, 100))
-    assert (frame.right, frame.top) == (4 * 72, 4 * 38)  # and two pixels around
-    assert (frame.left, frame.bottom) == pytest.approx((4 * 58, 4 * 52), abs=4.0)
-    assert frame_of(scene, bpy.context.object, 4, 1, Region(0, 0, 50, 50)) is None
+    cut = frame(scene, 4, 1, Region(0, 40, 70, 100))
+    assert (cut.right, cut.top) == (4 * 72, 4 * 38)  # and two pixels around
+    assert (cut.left, cut.bottom) == pytest.approx((4 * 58, 4 * 52), abs=4.0)
+    assert frame(scene, 4, 1, Region(0, 0, 50, 50)) is None
 
 
 @pytest.mark.parametrize(("outputs", "scale"), [(1, 8), (3000, 8), (4000, 4), (12000, 4), (16000, 2), (10**7, 1)])
 def test_many_outputs_are_rendered_at_a_smaller_scale(scene: Any, outputs: int, scale: int) -> None:
     """24 or 25 pixels each way, 16 bytes a subpixel, two gigabytes: 3125 outputs or more at scale 8, 12500 at 4."""
-    assert frame_of(scene, bpy.context.object, 8, outputs).scale == scale
+    assert frame(scene, 8, outputs).scale == scale
 
 
 def show_position(item: Any) -> None:
-    """Give an object a material that writes positions to the output "place"."""
-    material = bpy.data.materials.new("Square")
+    """Have an object's material write positions to the output "place"."""
+    material = item.active_material
     if material.node_tree is None:
         material.use_nodes = True
     tree = material.node_tree
     output = tree.nodes.new("ShaderNodeOutputAOV")
     output.aov_name = "place"
     tree.links.new(tree.nodes.new("ShaderNodeNewGeometry").outputs["Position"], output.inputs["Color"])
-    item.data.materials.append(material)
 
 
 @pytest.mark.parametrize("lens", ["ORTHO", "PERSP"])
@@ -76,10 +99,12 @@ def test_subpixels_by_a_shifted_camera_are_those_of_a_fine_picture(scene: Any, l
     item.rotation_euler = (0.4, 0.3, 0.2)
     show_position(item)
     bpy.context.view_layer.update()
-    frame = frame_of(scene, item, 4, 1)
+    around = frame(scene, 4, 1)
     before = scene.camera.data.shift_x, scene.cycles.filter_width
     fine, shifted = (
-        render_outputs(scene, bpy.context.view_layer, [("place", True)], frame, 16, by_pixels=by_pixels).values["place"]
+        render_outputs(scene, bpy.context.view_layer, [("place", True)], around, 16, by_pixels=by_pixels).values[
+            "place"
+        ]
         for by_pixels in (False, True)
     )
     assert (scene.camera.data.shift_x, scene.cycles.filter_width) == before
@@ -110,10 +135,10 @@ def test_pixels_that_are_not_square_are_looked_at_as_square_ones(
         render.resolution_x, render.resolution_y = size
         render.pixel_aspect_x, render.pixel_aspect_y = wide, high
         bpy.context.view_layer.update()
-        frame = frame_of(scene, item, 2, 1)
-        assert frame.full == (96, 64)
-        matrices.append(world_to_frame(scene, frame))
-        by_pixels = render_outputs(scene, bpy.context.view_layer, [("place", True)], frame, 4, by_pixels=True)
+        around = frame(scene, 2, 1)
+        assert around.full == (96, 64)
+        matrices.append(world_to_frame(scene, around))
+        by_pixels = render_outputs(scene, bpy.context.view_layer, [("place", True)], around, 4, by_pixels=True)
         found.append(by_pixels.values["place"])
         assert (render.resolution_x, render.resolution_y, render.pixel_aspect_x, render.pixel_aspect_y) == (
             *size,
