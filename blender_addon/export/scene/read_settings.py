@@ -70,8 +70,11 @@ def name_render_settings(scene: bpy.types.Scene, view_layer: bpy.types.ViewLayer
             "not. Turn Texture Cache off in Render Properties > Performance, and render the reference anew."
         )
     cycles = cycles_settings(scene)
-    read = next((image.name for image in bpy.data.images if image.users and reads_alpha_otherwise(image)), None)
-    if cycles is not None and cycles.shading_system and read is not None:
+    by_language = cycles is not None and cycles.shading_system
+    # what an image holds is read from its file
+    images = [image for image in bpy.data.images if image.users] if by_language else []
+    read = next((image.name for image in images if reads_alpha_otherwise(image)), None)
+    if read is not None:
         findings.note(
             f"Open Shading Language multiplies the colours of '{read}' by its alpha, and filters them in another way "
             "than the fit. Turn Open Shading Language off, and render the reference anew."
