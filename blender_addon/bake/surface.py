@@ -19,8 +19,8 @@ from numpy.typing import NDArray
 from ..export.meshes.read_mesh import material_of_slot, slot_count
 from ..export.nodes.dependence import OF_SIDE, OF_SURROUNDINGS, OF_VIEW, asked_for, asked_of_place
 from ..export.nodes.displacement import bends_normals, unbent
+from ..export.nodes.graph_findings import is_of_normal_map
 from ..export.nodes.leaf_kinds import EMISSION, distribution_of, is_shader, kind_of, only_nearest, walks_of
-from ..export.nodes.shader_graph import is_of_normal_map
 from ..probe.closure_tree import ClosureTree, Leaf, Value, own_groups
 from ..probe.light_path import SCATTERED, answer_light_paths, answer_random, light_path_outputs
 from ..versions import active_output

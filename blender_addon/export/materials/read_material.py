@@ -16,7 +16,13 @@ from ..findings import Findings, Fix
 from ..material_model import Material, Socket
 from ..nodes.closure_leaves import OUTPUT, UNKNOWN, ClosureLeaf
 from ..nodes.displacement import SHADING_NORMAL, bends_normals, displacement_of
-from ..nodes.graph_findings import graph_problem, note_few_samples, note_missing_pictures, note_pixel_sizes
+from ..nodes.graph_findings import (
+    graph_problem,
+    is_of_normal_map,
+    note_few_samples,
+    note_missing_pictures,
+    note_pixel_sizes,
+)
 from ..nodes.leaf_kinds import (
     EMISSION,
     TRANSPARENT,
@@ -29,7 +35,7 @@ from ..nodes.leaf_kinds import (
     only_nearest,
     walks_of,
 )
-from ..nodes.shader_graph import UnsupportedNodeError, is_of_normal_map, plain_value, read_socket, source_of
+from ..nodes.shader_graph import UnsupportedNodeError, plain_value, read_socket, source_of
 from ..nodes.target_shader import (
     DIRECTIONS,
     Place,

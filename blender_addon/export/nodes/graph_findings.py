@@ -11,7 +11,7 @@ import bpy
 
 from ...versions import active_output
 from ..findings import Findings
-from .shader_graph import Links
+from .shader_graph import Links, source_of
 
 GROUP, GROUP_INPUT = "ShaderNodeGroup", "NodeGroupInput"
 # rays of a Bevel node: on a box with rounded edges a block under a highlight was 10 % too bright with 4, Blender's own
@@ -89,6 +89,19 @@ def group_output(tree: bpy.types.NodeTree) -> bpy.types.Node | None:
     """The node of a group whose inputs are what the group gives."""
     outputs = [node for node in tree.nodes if node.bl_idname == "NodeGroupOutput"]
     return next((node for node in outputs if node.is_active_output), outputs[0] if outputs else None)
+
+
+def is_of_normal_map(source: bpy.types.NodeSocket) -> bool:
+    """Whether a Normal Map makes what an output gives, inside of groups where it is a group's.
+
+    Cycles turns its normal round on back faces, and mirrors that of a Bump there.
+    """
+    node = source.node
+    if node.bl_idname != GROUP or node.node_tree is None:
+        return node.bl_idname == "ShaderNodeNormalMap"
+    end = group_output(node.node_tree)
+    inner = None if end is None else source_of(end.inputs[source.identifier])
+    return inner is not None and is_of_normal_map(inner)
 
 
 def _problem(node: bpy.types.Node, is_copied: bool) -> str | None:

@@ -35,7 +35,6 @@ MATH = {
 
 # those that bend a picture's numbers, which Cycles interpolates before them
 BENDING = ("POWER", "MAXIMUM", "MINIMUM")
-GROUP = "ShaderNodeGroup"
 NOT_IN_CYCLES = ("ShaderNodeShaderToRGB", "NodeUndefined")  # what they feed has no link there
 
 
@@ -113,19 +112,6 @@ def surface_of(tree: bpy.types.NodeTree | None) -> bpy.types.Node | None:
         return None
     source = source_of(output.inputs["Surface"])
     return None if source is None else source.node
-
-
-def is_of_normal_map(source: bpy.types.NodeSocket) -> bool:
-    """Whether a Normal Map makes what an output gives, inside of groups where it is a group's.
-
-    Cycles turns its normal round on back faces, and mirrors that of a Bump there.
-    """
-    node = source.node
-    if node.bl_idname != GROUP or node.node_tree is None:
-        return node.bl_idname == "ShaderNodeNormalMap"
-    end = next((n for n in node.node_tree.nodes if n.bl_idname == "NodeGroupOutput" and n.is_active_output), None)
-    inner = None if end is None else source_of(end.inputs[source.identifier])
-    return inner is not None and is_of_normal_map(inner)
 
 
 def plain_value(socket: bpy.types.NodeSocket) -> Any:
