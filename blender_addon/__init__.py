@@ -13,7 +13,7 @@ from .check import preflight
 from .operators import CLASSES as OPERATORS
 from .operators import part
 from .panel import menu, thumbnails
-from .pictures import comparison, previews
+from .pictures import comparison, overlay, previews
 from .process import waiting_backend
 from .running import cycles_check, handlers, live, notice, running_export, running_job
 from .versions import is_module
@@ -49,6 +49,7 @@ def unregister() -> None:
     handlers.unregister()
     preflight.reset()
     comparison.forget()
+    overlay.forget()
     thumbnails.close()
     menu.unregister()
     translations.unregister()

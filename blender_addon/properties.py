@@ -5,6 +5,8 @@ material had before (Material.mfo, saved)."""
 # pyright: reportInvalidTypeForm=false
 # Blender reads properties from annotations
 
+from contextlib import suppress
+
 import bpy
 from bpy.props import (
     BoolProperty,
@@ -17,6 +19,7 @@ from bpy.props import (
     StringProperty,
 )
 
+from .picture_overlay import MFO_PG_overlay
 from .picture_part import MFO_PG_part, has_pixels
 from .pictures import comparison, overlay
 from .translations import CONTEXT
@@ -118,8 +121,11 @@ class MFO_PG_bound(bpy.types.PropertyGroup):
     upper: FloatProperty(name="Most", description="The fit goes no higher", precision=3, step=1, default=1.0)
 
 
-def _opacity_changed(settings: bpy.types.PropertyGroup, _context: bpy.types.Context) -> None:
-    overlay.set_opacity(settings.id_data.camera, settings.overlay_opacity)
+def _view_changed(settings: bpy.types.PropertyGroup, _context: bpy.types.Context) -> None:
+    scene = settings.id_data
+    if overlay.is_shown(scene.camera):
+        with suppress(RuntimeError):  # as a change of MFO_PG_overlay
+            overlay.show(scene)
 
 
 class MFO_PG_settings(bpy.types.PropertyGroup):
@@ -151,15 +157,7 @@ class MFO_PG_settings(bpy.types.PropertyGroup):
         "120 values together",
     )
     targets: CollectionProperty(type=MFO_PG_target)  # materials to be fitted together; empty: the active one alone
-    overlay_opacity: FloatProperty(
-        name="Opacity",
-        description="How much of the reference is seen over the camera's view",
-        min=0.0,
-        max=1.0,
-        default=0.5,
-        subtype="FACTOR",
-        update=_opacity_changed,
-    )
+    overlay: PointerProperty(type=MFO_PG_overlay)
     preset: EnumProperty(
         name="Preset", description="How the values are searched", items=PRESET_ITEMS, translation_context=CONTEXT
     )
@@ -214,6 +212,7 @@ class MFO_PG_settings(bpy.types.PropertyGroup):
                 "A photograph, or a render under the view transform Standard: compared under Standard",
             ),
         ),
+        update=_view_changed,
     )
     animated: EnumProperty(
         name="Animated",
@@ -333,6 +332,7 @@ class MFO_PG_material(bpy.types.PropertyGroup):
 CLASSES = (
     MFO_PG_bound,
     MFO_PG_part,
+    MFO_PG_overlay,
     MFO_PG_picture,
     MFO_PG_target,
     MFO_PG_settings,

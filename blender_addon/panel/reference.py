@@ -22,7 +22,6 @@ from .layout import (
     LABEL,
     NAMED_NUMBER,
     UNIT,
-    buttons_side_by_side,
     fits,
     names_of,
     room,
@@ -58,13 +57,7 @@ class Reference:
             if image is not None and not fits(context, room(context) - _IMAGE, image.name):
                 _draw_name(column, context, image.name)
         _draw_pictures(column, context, settings)
-        shown = overlay.is_shown(context.scene.camera)
-        row = buttons_side_by_side(layout, context, "Over the View", "") if shown else layout.row(align=True)
-        row.operator(
-            "mfo.overlay_reference", text="Over the View", icon="HIDE_OFF" if shown else "HIDE_ON", depress=shown
-        )
-        if shown:
-            row.prop(settings, "overlay_opacity", text="", slider=True)
+        _draw_overlay(layout.column(align=True), context, settings.overlay)
         if asks_view(context.scene):
             question = column.column(align=True)
             question.label(text="How was it made?")
@@ -88,6 +81,27 @@ def _draw_pictures(column: bpy.types.UILayout, context: bpy.types.Context, setti
     column.operator("mfo.add_picture", text="Add Another Picture", icon="ADD")
     if context.window_manager.mfo_runtime.cycles_of_reference:
         draw_render(column, context)
+
+
+def _draw_overlay(column: bpy.types.UILayout, context: bpy.types.Context, over: bpy.types.PropertyGroup) -> None:
+    """The reference over the camera's view, and how it lies there."""
+    shown = overlay.is_shown(context.scene.camera)
+    column.operator(
+        "mfo.overlay_reference", text="Over the View", icon="HIDE_OFF" if shown else "HIDE_ON", depress=shown
+    )
+    if not shown:
+        return
+    row = side_by_side(column, context, *names_of(over, "mode"), margins=BUTTON)
+    row.prop(over, "mode", expand=True)
+    if over.mode == "BLEND":
+        column.prop(over, "opacity", slider=True)
+        return
+    if over.mode == "SPLIT":
+        column.prop(over, "line", slider=True)
+    shading = getattr(context.space_data, "shading", None)
+    if shading is not None and shading.type != "RENDERED":
+        turn = column.operator("wm.context_set_enum", text="Render the View", icon="SHADING_RENDERED")
+        turn.data_path, turn.value = "space_data.shading.type", "RENDERED"
 
 
 def _draw_path(

@@ -8,10 +8,16 @@ from pathlib import Path
 import bpy
 import numpy as np
 
-from ..export.camera.camera_model import Region
-from ..export.camera.render_region import Size, picture_size, pictured_region
+from ..export.camera.render_region import picture_size, pictured_region
+from ..export.images.image_pixels import UnreadableImageError
+from . import view_paint
+from .as_viewed import as_viewed
+from .view_paint import Display, Paint
 
 NAME = "Material Fit Overlay"  # of the image, by which the background is known again
+LONGEST_SIDE = 2048  # pixels: no view shows more, and a line that is dragged paints all of them anew
+
+_picture: Display | None = None  # what lies over the view, before split or difference
 
 
 def is_shown(camera: bpy.types.Object | None) -> bool:
@@ -20,46 +26,114 @@ def is_shown(camera: bpy.types.Object | None) -> bool:
 
 
 def show(scene: bpy.types.Scene) -> None:
-    """Put the reference over the view of the scene's camera.
+    """Put the reference over the view of the scene's camera, in the way that the settings say.
+
+    A file whose pixels Blender does not give, as an EXR of several layers, is seen through, but neither split nor
+    subtracted.
 
     Raises
     ------
     RuntimeError
-        If its file cannot be read.
+        If its file cannot be read, or not in that way.
     """
+    global _picture
     settings = scene.mfo
     hide(scene.camera)
-    if settings.reference_source == "IMAGE":
-        image = settings.reference_image.copy()
+    _picture, image = None, _loaded(settings)
+    try:
+        _picture = _in_frame(image, scene)
+    except UnreadableImageError as problem:
+        if settings.overlay.mode != "BLEND":
+            bpy.data.images.remove(image)
+            raise RuntimeError(f"it {problem}") from None
     else:
-        image = bpy.data.images.load(str(Path(bpy.path.abspath(settings.reference_path))), check_existing=False)
-    region = pictured_region(scene.render, (image.size[0], image.size[1]))
-    if region is not None:
-        image = _in_frame(image, region, picture_size(scene.render))
+        bpy.data.images.remove(image)
+        height, width = _picture.shape[:2]
+        image = bpy.data.images.new(NAME, width, height, alpha=True)
+        image.pixels.foreach_set(_painted(settings.overlay).ravel())
+        image.pack()  # a drawn image whose pixels no file holds is lost with the next undo step
     image.name = NAME
     camera = scene.camera.data
     background = camera.background_images.new()
-    background.image, background.display_depth = image, "FRONT"
-    background.frame_method, background.alpha = "CROP", settings.overlay_opacity
+    background.image, background.display_depth, background.frame_method = image, "FRONT", "CROP"
+    background.alpha = _opacity(settings.overlay)
     camera.show_background_images = True
 
 
-def _in_frame(image: bpy.types.Image, region: Region, size: Size) -> bpy.types.Image:
-    """An image of a frame that shows `image`, which goes away, in a region and nothing beside."""
-    width, height = size
-    framed = bpy.data.images.new(NAME, width, height, alpha=True, float_buffer=image.is_float)
-    framed.colorspace_settings.name = image.colorspace_settings.name
-    shown = np.empty(len(image.pixels), np.float32)
-    image.pixels.foreach_get(shown)
-    shown = shown.reshape(image.size[1], image.size[0], image.channels)
+def change(scene: bpy.types.Scene) -> None:
+    """Show it in the way that the settings say now; nothing where it is not shown.
+
+    Raises
+    ------
+    RuntimeError
+        As `show`.
+    """
+    background = _background(scene.camera)
+    if background is None:
+        return
+    if not repaint(scene):
+        show(scene)
+    else:
+        background.alpha = _opacity(scene.mfo.overlay)  # which also has the view drawn
+
+
+def repaint(scene: bpy.types.Scene) -> bool:
+    """Paint in the way that the settings say now, and return whether the picture was kept that this takes.
+
+    An undo brings the settings back, and not always the pixels.
+    """
+    background = _background(scene.camera)
+    if background is None or _picture is None or tuple(background.image.size) != _picture.shape[1::-1]:
+        return False
+    background.image.pixels.foreach_set(_painted(scene.mfo.overlay).ravel())
+    background.image.update()
+    return True
+
+
+def keep() -> None:
+    """Let the file that is saved hold what was painted; the line is dragged without that, which takes too long."""
+    for image in bpy.data.images:
+        if image.name.startswith(NAME) and image.is_dirty:
+            image.pack()
+
+
+def forget() -> None:
+    """Free the pixels kept for `change`."""
+    global _picture
+    _picture = None
+
+
+def _loaded(settings: bpy.types.PropertyGroup) -> bpy.types.Image:
+    """The reference as an image of its own."""
+    if settings.reference_source == "IMAGE":
+        return settings.reference_image.copy()
+    return bpy.data.images.load(str(Path(bpy.path.abspath(settings.reference_path))), check_existing=False)
+
+
+def _in_frame(image: bpy.types.Image, scene: bpy.types.Scene) -> Display:
+    """The picture of the frame, with nothing beside the region that an image shows."""
+    region = pictured_region(scene.render, (image.size[0], image.size[1]))
+    if region is None:
+        longer = max(image.size)
+        if longer > LONGEST_SIDE:
+            image.scale(*(max(round(side * LONGEST_SIDE / longer), 1) for side in image.size))
+        return as_viewed(image, scene)
+    width, height = picture_size(scene.render)
     pixels = np.zeros((height, width, 4), np.float32)
     inside = pixels[height - region.bottom : height - region.top, region.left : region.right]  # rows from below
-    inside[..., 3] = 1.0
-    inside[..., : image.channels] = shown if image.channels > 2 else shown[..., :1]
-    framed.pixels.foreach_set(pixels.ravel())
-    framed.pack()  # a drawn image whose pixels no file holds is lost with the next undo step
-    bpy.data.images.remove(image)
-    return framed
+    inside[:] = as_viewed(image, scene)
+    return pixels
+
+
+def _painted(over: bpy.types.PropertyGroup) -> Paint:
+    assert _picture is not None
+    if over.mode == "SPLIT":
+        return view_paint.split(_picture, over.line)
+    return view_paint.difference(_picture) if over.mode == "DIFFERENCE" else view_paint.whole(_picture)
+
+
+def _opacity(over: bpy.types.PropertyGroup) -> float:
+    return over.opacity if over.mode == "BLEND" else 1.0
 
 
 def hide(camera: bpy.types.Object | None) -> None:
@@ -67,14 +141,8 @@ def hide(camera: bpy.types.Object | None) -> None:
     while camera is not None and (background := _background(camera)) is not None:
         image = background.image
         camera.data.background_images.remove(background)
+        camera.data.update_tag()  # else the view goes on with a copy of the camera that shows the freed image
         bpy.data.images.remove(image)
-
-
-def set_opacity(camera: bpy.types.Object | None, opacity: float) -> None:
-    """How much of the reference is seen, 0 to 1."""
-    background = _background(camera)
-    if background is not None:
-        background.alpha = opacity
 
 
 def background_of(camera: bpy.types.Object | None) -> bpy.types.Image | None:

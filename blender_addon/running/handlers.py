@@ -7,7 +7,7 @@ import bpy
 from bpy.app.handlers import persistent
 
 from ..check import preflight
-from ..pictures import comparison
+from ..pictures import comparison, overlay
 from . import cycles_check, kept_results, notice, running_export, running_job
 
 _ended = ""  # what is to be said of the file that is left
@@ -26,6 +26,7 @@ def _before_load(*_args: object) -> None:
 def _after_load(*_args: object) -> None:
     global _ended
     comparison.forget()
+    overlay.forget()
     said = [_ended] if _ended else []
     _ended = ""
     if not bpy.app.background:  # a script gets the file as it is
@@ -33,6 +34,11 @@ def _after_load(*_args: object) -> None:
     running_job.reset(" ".join(said))  # the window manager comes out of the file, with the state of another day
     if said:
         notice.show(" ".join(said))
+
+
+@persistent
+def _before_save(*_args: object) -> None:
+    overlay.keep()
 
 
 @persistent
@@ -48,7 +54,8 @@ def _before_undo(*_args: object) -> None:
 
 
 @persistent
-def _after_change(*_args: object) -> None:
+def _after_undo(*_args: object) -> None:
+    overlay.repaint(bpy.context.scene)
     preflight.request()
 
 
@@ -61,12 +68,13 @@ def _after_update(_scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> No
 _HANDLERS = {
     "load_pre": _before_load,
     "load_post": _after_load,
+    "save_pre": _before_save,
     "save_post": _after_save,
     "depsgraph_update_post": _after_update,
     "undo_pre": _before_undo,
     "redo_pre": _before_undo,
-    "undo_post": _after_change,
-    "redo_post": _after_change,
+    "undo_post": _after_undo,
+    "redo_post": _after_undo,
 }
 
 

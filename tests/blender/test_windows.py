@@ -65,6 +65,15 @@ def test_main_way_by_mouse_and_keys(windowed: RealBlender, tmp_path: Path, scale
     assert "script error" not in out, out[-4000:]
 
 
+def test_the_reference_against_the_view(windowed: RealBlender, tmp_path: Path) -> None:
+    """Its own render over the camera's view: no seam where it is split, one grey where it is subtracted."""
+    script = [str(SCRIPT.parent / "desktop" / "over_the_view.py"), "--", ADDON_ID, str(tmp_path)]
+    options = ["--enable-event-simulate", "--addons", ADDON_ID, "--python-exit-code", "3", "--python"]
+    out = windowed.run(*options, *script, windows=True).stdout
+    assert "ALL GOOD over the view" in out, out[-4000:]
+    assert "script error" not in out, out[-4000:]
+
+
 def test_two_pictures_and_two_materials_by_real_events(windowed: RealBlender, tmp_path: Path) -> None:
     """Both lists, the real backend: values near the truth of Cycles, a verdict for each, one step to apply and undo."""
     script = [str(SCRIPT.parent / "desktop" / "both_lists.py"), "--", ADDON_ID, str(tmp_path)]

@@ -84,7 +84,7 @@ def test_it_lies_over_the_view_and_leaves_nothing(scene: SimpleNamespace) -> Non
     assert bpy.ops.mfo.overlay_reference() == {"FINISHED"}
     shown = camera.background_images[1]
     assert (shown.image.size[:], shown.display_depth, shown.alpha) == ((96, 64), "FRONT", 0.5)
-    settings.overlay_opacity = 0.25
+    settings.overlay.opacity = 0.25
     assert shown.alpha == 0.25
     assert bpy.ops.mfo.overlay_reference() == {"FINISHED"}
     assert list(camera.background_images) == [mine]

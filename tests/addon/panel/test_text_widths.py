@@ -62,6 +62,7 @@ def cut(scene: SimpleNamespace, language: str, width: float, scale: float) -> li
         object=context.object,
         view_layer=context.view_layer,
         window_manager=context.window_manager,
+        space_data=SimpleNamespace(shading=SimpleNamespace(type="SOLID")),
         preferences=SimpleNamespace(system=SimpleNamespace(ui_scale=scale), addons=context.preferences.addons),
         region=SimpleNamespace(width=width * scale),
         selected_objects=list(filter(None, [context.object])),
@@ -150,6 +151,14 @@ def with_questions(scene: SimpleNamespace, _patch: pytest.MonkeyPatch) -> Iterat
     yield
     scene.bpy.data.objects.remove(context.object)
     yield
+
+
+def with_an_overlay(scene: SimpleNamespace, _patch: pytest.MonkeyPatch) -> Iterator[None]:
+    settings = scene.bpy.context.scene.mfo
+    settings.reference_path = scene.reference
+    scene.bpy.ops.mfo.overlay_reference()
+    for settings.overlay.mode in ("BLEND", "SPLIT", "DIFFERENCE"):
+        yield
 
 
 def with_a_result(scene: SimpleNamespace, patch: pytest.MonkeyPatch) -> Iterator[None]:
@@ -283,7 +292,7 @@ def with_long_names(scene: SimpleNamespace, _patch: pytest.MonkeyPatch) -> Itera
 
 STATES = (
     with_problems, with_long_names, with_questions, while_it_exports, while_it_runs, with_a_result, with_chosen_values,
-    with_a_queue, with_a_mix_and_motion, with_several_pictures, with_the_backend,
+    with_a_queue, with_a_mix_and_motion, with_several_pictures, with_the_backend, with_an_overlay,
 )  # fmt: skip
 
 
