@@ -28,6 +28,7 @@ class Cause(Enum):
     LIGHT = "light"
     SURROUNDINGS = "surroundings"
     PICTURE = "picture"
+    NOISE = "noise"
     NOTED = "noted"
     MATERIAL = "material"
 
@@ -110,6 +111,7 @@ _CAUSES = {
     Cause.SURROUNDINGS: "Something around the object differs as well: check what is missing, hidden or moved.",
     Cause.PICTURE: "The outline of the object is hardly in the picture: check whether it shows this scene, and world "
     "and lamps.",
+    Cause.NOISE: "So few pixels of so much noise may hide any difference: a larger or cleaner picture tells more.",
     Cause.NOTED: "The notes name what the fit does not know of this scene; that may be the reason.",
     Cause.MATERIAL: "The surroundings match, the object does not: it may have a texture that the scene lacks, or be of "
     "another kind of material than the chosen values can make.",

@@ -8,6 +8,7 @@ PANEL = {
     "The result is close to the reference: compare before applying.": "Le résultat est proche de la référence : comparer avant d'appliquer.",
     "The result does not match the reference.": "Le résultat ne correspond pas à la référence.",
     "So few pixels of so much noise may hide a fine difference: a larger or cleaner picture tells more.": "Si peu de pixels avec tant de bruit peuvent cacher une différence fine : une image plus grande ou plus propre en dit plus.",
+    "So few pixels of so much noise may hide any difference: a larger or cleaner picture tells more.": "Si peu de pixels avec tant de bruit peuvent cacher n'importe quelle différence : une image plus grande ou plus propre en dit plus.",
     "Picture {}: The result looks the same as the reference.": "Image {} : Le résultat ressemble à la référence.",
     "Picture {}: The result is close to the reference: compare before applying.": "Image {} : Le résultat est proche de la référence : comparer avant d'appliquer.",
     "Picture {}: The result does not match the reference.": "Image {} : Le résultat ne correspond pas à la référence.",

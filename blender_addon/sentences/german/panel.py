@@ -8,6 +8,7 @@ PANEL = {
     "The result is close to the reference: compare before applying.": "Das Ergebnis ist nahe an der Referenz: vor dem Anwenden vergleichen.",
     "The result does not match the reference.": "Das Ergebnis passt nicht zur Referenz.",
     "So few pixels of so much noise may hide a fine difference: a larger or cleaner picture tells more.": "So wenige Pixel mit so viel Rauschen können einen feinen Unterschied verbergen: ein größeres oder saubereres Bild sagt mehr.",
+    "So few pixels of so much noise may hide any difference: a larger or cleaner picture tells more.": "So wenige Pixel mit so viel Rauschen können jeden Unterschied verbergen: ein größeres oder saubereres Bild sagt mehr.",
     "Picture {}: The result looks the same as the reference.": "Bild {}: Das Ergebnis sieht aus wie die Referenz.",
     "Picture {}: The result is close to the reference: compare before applying.": "Bild {}: Das Ergebnis ist nahe an der Referenz: vor dem Anwenden vergleichen.",
     "Picture {}: The result does not match the reference.": "Bild {}: Das Ergebnis passt nicht zur Referenz.",

@@ -15,8 +15,8 @@ from ...metrics.flip.block_means import block_side, block_sums
 from ...render.camera.widened_mask import widened
 from ...types.image import Encoding, Image, Pixels
 from ...types.result import PictureResult
-from ...types.verdict import Difference, Judgement, Verdict, worst
-from .beyond_noise import FEW_PIXELS, NEXT, beyond_noise, displayed, mean_flip
+from ...types.verdict import Cause, Difference, Judgement, Verdict, worst
+from .beyond_noise import BLURRED_TOGETHER, FEW_PIXELS, NEXT, beyond_noise, displayed, mean_flip
 from .likely_cause import likely_cause
 
 # Measured on Cycles scenes by `studies.verdicts` (docs/user/verdicts.md): with nothing planted at most 0.019, 0.005 and
@@ -64,8 +64,11 @@ def judge(
     if verdict is Verdict.SAME and differs:
         verdict = Verdict.CLOSE
     shown, result_shown = map(displayed, target)
+    pixels = np.count_nonzero(inside)
+    if verdict is Verdict.SAME and difference.noise > HIDDEN * math.sqrt(pixels / BLURRED_TOGETHER):
+        return Judgement(Verdict.CLOSE, Cause.NOISE, difference, around)
     if verdict is Verdict.SAME:
-        few = np.count_nonzero(inside) < FEW_PIXELS
+        few = pixels < FEW_PIXELS
         # pixel by pixel, noise included: no difference of the pictures is larger
         hides = few and mean_flip(shown, result_shown, inside) > HIDDEN
         return Judgement(verdict, None, difference, around, may_hide=hides)

@@ -153,7 +153,7 @@ def is_worth_another(result: FitResult, selection: str | Sequence[str]) -> bool:
     if judgement is None or selection != "all" or result.model != "blender_principled":
         return False
     # another class has another shadow, too, so light may seem to be the cause
-    return judgement.verdict is not Verdict.SAME and judgement.cause is not Cause.PICTURE
+    return judgement.verdict is not Verdict.SAME and judgement.cause not in (Cause.PICTURE, Cause.NOISE)
 
 
 def with_values_of(other: MaterialClass, result: FitResult, material: Mapping[str, Any]) -> FitResult:

@@ -126,7 +126,7 @@ def test_few_pixels_hide_no_difference_in_the_tails_of_noise(radius):
     assert 0.4 * apart < np.mean(visible[0.55]) < apart
 
 
-@pytest.mark.parametrize(("radius", "share", "hides"), [(9, 0.15, True), (9, 0.01, False), (26, 0.15, False)])
+@pytest.mark.parametrize(("radius", "share", "hides"), [(9, 0.06, True), (9, 0.01, False), (26, 0.15, False)])
 def test_few_noisy_pixels_are_said_to_hide_fine_differences(radius, share, hides):
     mask = np.hypot(ROWS - 48, COLUMNS - 48) < radius
     reference, result = noisy(scene(), share, 1), noisy(scene(), share / 2.0, 2)
@@ -135,6 +135,20 @@ def test_few_noisy_pixels_are_said_to_hide_fine_differences(radius, share, hides
     assert found.verdict is Verdict.SAME
     assert found.may_hide is hides
     assert found.sentence.endswith("a larger or cleaner picture tells more.") is hides
+
+
+@pytest.mark.parametrize(
+    ("radius", "share", "verdict"), [(5, 0.3, Verdict.CLOSE), (5, 0.02, Verdict.SAME), (26, 0.15, Verdict.SAME)]
+)
+def test_a_target_whose_noise_hides_any_difference_is_not_called_the_same(radius, share, verdict):
+    """On 81 pixels, and on 2,120 of as much noise, whose mean tells."""
+    mask = np.hypot(ROWS - 48, COLUMNS - 48) < radius
+    for k in range(4):
+        reference, result = noisy(scene(), share, k), noisy(scene(), share / 2.0, 50 + k)
+        found = judge(Image(reference, Encoding.LINEAR), result, mask, VIEW)
+        assert found is not None
+        assert found.verdict is verdict
+        assert found.cause is (None if verdict is Verdict.SAME else Cause.NOISE)
 
 
 def test_few_pixels_have_no_verdict():

@@ -90,6 +90,7 @@ def test_another_class_is_worth_it_where_the_material_may_be_wrong():
     assert is_worth_another(result(wrong), "all")
     assert not is_worth_another(result(judgement(Verdict.SAME)), "all")
     assert not is_worth_another(result(judgement(Verdict.DIFFERENT, Cause.PICTURE)), "all")
+    assert not is_worth_another(result(judgement(Verdict.CLOSE, Cause.NOISE)), "all")
     assert not is_worth_another(result(None), "all")
     assert not is_worth_another(result(wrong), "reduced")  # the user holds transmission and alpha
     assert not is_worth_another(result(wrong), ("base_color",))
