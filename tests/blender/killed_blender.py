@@ -38,10 +38,12 @@ def kill_blender_of_a_graph_fit(command: Sequence[str], folder: Path, *words: st
     assert (folder / "scene.blend").read_bytes() == blend
     hidden = [path.name for path in folder.glob(".*")]
     assert hidden == [], hidden
-    assert left_in(temporary, "blender_", "mfo_nodes_", "mfo_llvm_") == []
+    left = left_in(temporary, "blender_", "mfo_nodes_", "mfo_llvm_")
+    assert left == [], left
     start = [sys.executable, "-m", "mfo_backend", "--version"]
     subprocess.run(start, env=environment, cwd=ROOT, check=True, stdout=subprocess.DEVNULL)
-    assert left_in(temporary, "blender_") == []  # Blender's own folder for one session
+    left = left_in(temporary, "blender_")  # Blender's own folder for one session
+    assert left == [], left
 
 
 def left_in(temporary: Path, *known: str) -> list[str]:
