@@ -14,7 +14,7 @@ from .arrays.grid_table import loaded_buffers
 from .cycles_model import CyclesModel
 from .mitsuba_principled import MitsubaPrincipled
 from .principled.blender_principled import BLENDER_5_0, blender_principled, evaluate
-from .principled.bumped_normals import BUMPED_NORMALS, LEAF_NORMALS, turned_to_leaf
+from .principled.bumped_normals import BUMPED_NORMALS, LEAF_NORMALS, OWN_NORMALS, turned_to_leaf
 from .principled.layers import layer_stack
 from .principled.mix_values import MixValues, amount_of
 from .principled.needed_lobes import needed_lobes
@@ -86,9 +86,9 @@ class BlenderPrincipledModel:
     limited_width: bool = True
     widths: tuple[str, ...] = ("roughness",)
 
-    def __init__(self, cycles: CyclesModel = BLENDER_5_0, *, bumped: bool = False) -> None:
+    def __init__(self, cycles: CyclesModel = BLENDER_5_0, *, normals: ParameterTable = NO_NORMALS) -> None:
         self._cycles = cycles
-        self.normals = BUMPED_NORMALS if bumped else NO_NORMALS
+        self.normals = normals
 
     def values(self, given: Mapping[str, Value | None], free: Collection[str]) -> dict[str, Value | None]:
         """See `RecordedModel`."""
@@ -114,8 +114,8 @@ class InnerLightModel(BlenderPrincipledModel):
     the surface, a lane whose walk has a length is of that.
     """
 
-    def __init__(self, cycles: CyclesModel = BLENDER_5_0, *, bumped: bool, glows: bool, walks: bool) -> None:
-        super().__init__(cycles, bumped=bumped)
+    def __init__(self, cycles: CyclesModel = BLENDER_5_0, *, normals: ParameterTable, glows: bool, walks: bool) -> None:
+        super().__init__(cycles, normals=normals)
         self._glows = glows
         self.walks = WALK if walks else NO_WALK
 
@@ -148,7 +148,7 @@ class MixedModel(BlenderPrincipledModel):
     """
 
     def __init__(self, tree: Any, mix: MixValues) -> None:
-        super().__init__(tree.model, bumped=bool(tree.directions))
+        super().__init__(tree.model, normals=normals_of(tree))
         self._tree, self._mix = tree, mix
         self._names = {
             k: {p.name: mix.leaves.get(k, {}).get(p.name, f"leaf_{k}.{p.name}") for p in BLENDER_PRINCIPLED}
@@ -172,7 +172,7 @@ class MixedModel(BlenderPrincipledModel):
         self._turned = {
             k: {p.name: f"leaf_{k}.{p.name}" for p in LEAF_NORMALS}
             for k, leaf in tree.free_leaves.items()
-            if leaf.material.directions
+            if leaf.material.bumped
         }
         of_leaves = (
             replace(LEAF_NORMALS[p], name=shown) for names in self._turned.values() for p, shown in names.items()
@@ -194,7 +194,7 @@ class MixedModel(BlenderPrincipledModel):
         own = needed_lobes({n: v for n, v in fixed.items() if n in BLENDER_PRINCIPLED.names}, free)
         leaves: list[tuple[Any, Mapping[str, str], Mapping[str, str] | None, str, Any]]
         leaves = [(self._tree.fitted, {}, None, "weight", own)]
-        mesh = {} if self._tree.directions else None  # how a leaf without normals of its own is turned
+        mesh = {} if self._tree.bumped else None  # how a leaf without normals of its own is turned
         for k, names in self._names.items():
             known = {name: fixed[shown] for name, shown in names.items() if shown in fixed}
             lobes = needed_lobes(known, [name for name, shown in names.items() if shown in free])
@@ -223,6 +223,13 @@ class MixedModel(BlenderPrincipledModel):
         return seen
 
 
+def normals_of(bsdf: Any) -> ParameterTable:
+    """The directions that lanes of a scene's material hold besides: what nodes give it, or the mesh."""
+    if getattr(bsdf, "directions", ()):
+        return BUMPED_NORMALS
+    return OWN_NORMALS if getattr(bsdf, "bumped", False) else NO_NORMALS
+
+
 def _number(weight: Any) -> float | None:
     """A weight of the plugin, None for a texture."""
     return None if hasattr(weight, "eval_1") else float(weight[0])
@@ -245,8 +252,8 @@ def recorded_model(
     if mix is not None:
         return MixedModel(bsdf, mix)
     if name == "blender_principled":
-        cycles, bumped = getattr(bsdf, "model", BLENDER_5_0), bool(getattr(bsdf, "directions", ()))
+        cycles, normals = getattr(bsdf, "model", BLENDER_5_0), normals_of(bsdf)
         if glows or walks:
-            return InnerLightModel(cycles, bumped=bumped, glows=glows, walks=walks)
-        return BlenderPrincipledModel(cycles, bumped=bumped)
+            return InnerLightModel(cycles, normals=normals, glows=glows, walks=walks)
+        return BlenderPrincipledModel(cycles, normals=normals)
     raise UnrecordableError(f"Material model {name!r} has no recorded-path version.")

@@ -179,6 +179,11 @@ class ClosureTree(mi.BSDF):
         """Normals and tangents that nodes give the fitted material."""
         return self.fitted.material.directions
 
+    @property
+    def bumped(self) -> bool:
+        """Whether the fitted material's lobes have normals of their own."""
+        return self.fitted.material.bumped
+
     def traverse(self, callback: Any) -> None:  # pyright: ignore[reportIncompatibleMethodOverride]
         """Show the fitted material, and what else may change."""
         callback.put("fitted", self.fitted.material, mi.ParamFlags.Differentiable)
@@ -207,11 +212,11 @@ class ClosureTree(mi.BSDF):
         if not self.is_open:
             return values
         values["weight"] = self.fitted.plain_weight_at(si, active)
-        bumped = any(leaf.material.directions for leaf in self.free_leaves.values())
-        frame = self.bumped_frame(si, active)[0] if bumped and self.directions else si.sh_frame
+        bumped = any(leaf.material.bumped for leaf in self.free_leaves.values())
+        frame = self.bumped_frame(si, active)[0] if bumped and self.bumped else si.sh_frame
         for k, leaf in self.free_leaves.items():
             of_leaf = leaf.material.values_at(si, active) | {"weight": leaf.plain_weight_at(si, active)}
-            if leaf.material.directions:
+            if leaf.material.bumped:
                 given = leaf.material.normals_at(si, active)
                 of_leaf |= {name: mi.Vector3f(frame.to_local(given[name])) for name in LEAF_NORMALS.names}
             values |= {f"leaf_{k}.{name}": value for name, value in of_leaf.items()}

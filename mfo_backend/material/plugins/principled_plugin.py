@@ -6,6 +6,8 @@ further `distribution` ("MULTI_GGX", "GGX"), `blender_version` ("5.0"), `shader`
 `cycles_model.SHADERS`) and `free`: comma-separated names that will
 change after loading, and `subsurface_method`. Lobes whose weight is zero, not textured and not free are not traced;
 changing such a value later brings the lobe back and compiles anew.
+`own_normals` (false) tells normals that turn away from the view: its glossy lobes alone take those that are bent to it,
+which a surface point's frame has, and all others `own_normal`.
 `filtered` (false) reads what the integrator `cycles_path` puts where no texture of Mitsuba 3.9 looks: the least alpha
 of the microfacet lobes, for Filter Glossy, from `si.duv_dx.x`, a 1 from `si.duv_dx.y` where it leaves what is below
 the surface to others (a `closure_tree` of which several let light walk there takes that from them, and they show their
@@ -21,7 +23,7 @@ shading frame, dp/du of the UV map.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import cache
 from typing import Any
 
@@ -35,34 +37,18 @@ from ...types.parameter import Value
 from ..arrays.clamp import saturate
 from ..cycles_model import CyclesModel, cycles_model
 from ..principled.blender_principled import evaluate
-from ..principled.bumped_normals import BUMPED_NORMALS, BumpedNormals, valid_normal
+from ..principled.bumped_normals import BUMPED_NORMALS, OWN_NORMALS, BumpedNormals, valid_normal
 from ..principled.layers import Layers, layer_stack, sampled_emission
 from ..principled.lobe_sampling import NAMES, LobeChoice, is_diffuse, lobe_choice, pdf, sample
 from ..principled.needed_lobes import Lobes, needed_lobes
 from ..principled.principled_parameters import BLENDER_PRINCIPLED
 from ..principled.random_walk import Below
+from .own_normal import own_normal
+from .surface_layers import SurfaceLayers
 
 PLUGIN_NAME = "blender_principled"
 DIRECTIONS = ("shading_normal", "normal", "coat_normal", "tangent")
 GIVEN = 0.1  # length of a direction above which there is one
-
-
-@dataclass(frozen=True)
-class SurfaceLayers:
-    """The layers at a surface point, and their frame in the world where it is not that of the point."""
-
-    layers: Layers
-    si: Any
-    frame: Any
-
-    def to_local(self, wo: Any) -> Any:
-        """A direction of the point's frame in that of the layers."""
-        return self.layers.to_frame(wo if self.frame is None else self.frame.to_local(self.si.to_world(wo)))
-
-    def from_local(self, direction: Any) -> Any:
-        """The inverse of `to_local`."""
-        wo = self.layers.from_frame(direction)
-        return wo if self.frame is None else self.si.to_local(self.frame.to_world(wo))
 
 
 class BlenderPrincipled(mi.BSDF):
@@ -77,6 +63,7 @@ class BlenderPrincipled(mi.BSDF):
         walks = str(props.get("subsurface_method", "RANDOM_WALK"))
         self.model = cycles_model(version, str(props.get("distribution", "MULTI_GGX")), shader, walks)
         self.filtered, self.walks = bool(props.get("filtered", False)), True
+        self.own_normals = bool(props.get("own_normals", False))
         self.free = {name.strip() for name in str(props.get("free", "")).split(",") if name.strip()}
         BLENDER_PRINCIPLED.select(self.free or BLENDER_PRINCIPLED.names)  # refuses unknown names
         self.given = [item.name for item in BLENDER_PRINCIPLED if item.name in props]
@@ -149,6 +136,11 @@ class BlenderPrincipled(mi.BSDF):
         return mi.Color3f(self.layers_at(si, active, **own).layers.emission)
 
     @property
+    def bumped(self) -> bool:
+        """Whether lobes have normals of their own: what nodes give, or those of the mesh."""
+        return self.own_normals or bool(self.directions)
+
+    @property
     def absorbing(self) -> BlenderPrincipled | None:
         """Itself, if it takes of the light inside of its objects."""
         return self if self.absorbs and self.lets_in else None
@@ -197,7 +189,7 @@ class BlenderPrincipled(mi.BSDF):
         """What is traced: two materials of one kind differ in the values that are `opened`; None with textures."""
         if self.directions or None in self.fixed.values():
             return None
-        return (self.lobes, self.model, self.filtered, self.walks, self.opened)
+        return (self.lobes, self.model, self.filtered, self.walks, self.own_normals, self.opened)
 
     @property
     def row(self) -> NDArray[np.float32]:
@@ -254,6 +246,8 @@ class BlenderPrincipled(mi.BSDF):
     def shading_normal(self, si: mi.SurfaceInteraction3f, active: Any) -> mi.Vector3f:
         """The mesh's normal on the side of the view, as a displacement by bump has bent it."""
         smooth: Any = mi.Vector3f(si.sh_frame.n) * dr.mulsign(mi.Float(1), si.wi.z)
+        if self.own_normals:
+            smooth = own_normal(si, smooth)
         return self._turned_to_view("shading_normal", si, smooth, active)
 
     def _turned_to_view(self, name: str, si: mi.SurfaceInteraction3f, smooth: mi.Vector3f, active: Any) -> mi.Vector3f:
@@ -282,9 +276,9 @@ class BlenderPrincipled(mi.BSDF):
     def layers_at(self, si: mi.SurfaceInteraction3f, active: Any, **instead: Any) -> SurfaceLayers:
         """The layers at a surface point, with the values `instead` of its own."""
         values, wi, frame = self.values_at(si, active) | instead, si.wi, None
-        if self.directions:
+        if self.bumped:
             frame, wi, normals = self.bumped_frame(si, active)
-            values |= normals
+            values |= normals if self.directions else {name: normals[name] for name in OWN_NORMALS.names}
         layers = layer_stack(values, wi, self.lobes, self.model)
         if self.filtered:
             layers = layers.blurred(si.duv_dx.x)

@@ -21,6 +21,8 @@ from ..arrays import dual as dr
 BUMPED_NORMALS = ParameterTable(
     Parameter(name, 3, -1.0, 1.0, (0.0, 0.0, 1.0)) for name in ("smooth_normal", "bumped_normal", "coat_normal")
 )
+# Where nodes give none and the mesh's own turn away from the view: all lobes but those of microfacets take them
+OWN_NORMALS = ParameterTable((BUMPED_NORMALS["smooth_normal"],))
 # What nodes give another leaf of a mix, in the frame of the fitted one's microfacets: the normal of its own, those of
 # its diffuse lobes and of its coat, and its tangent
 LEAF_NORMALS = ParameterTable(
@@ -50,10 +52,12 @@ class BumpedNormals:
     @staticmethod
     def of(parameters: Mapping[str, Any], turn: Any, *, shade: bool = True) -> BumpedNormals | None:
         """Those among the parameters, through `turn` into the layers' frame; None for a surface without."""
-        if "bumped_normal" not in parameters:
+        if "smooth_normal" not in parameters:
             return None
-        smooth, diffuse, coat = (turn(parameters[p.name]) for p in BUMPED_NORMALS)
-        return BumpedNormals(smooth, diffuse, coat, shade)
+        smooth = turn(parameters["smooth_normal"])
+        if "bumped_normal" not in parameters:
+            return BumpedNormals(smooth, smooth, dr.kind_of(smooth)(0, 0, 1), shade)
+        return BumpedNormals(smooth, turn(parameters["bumped_normal"]), turn(parameters["coat_normal"]), shade)
 
     def lit(self, normal: Any, wo: Any) -> Any:
         """Whether a lobe about `normal` sees light from `wo`: on the same side of the mesh as of its own plane."""

@@ -95,11 +95,12 @@ def pdf(layers: Layers, choice: LobeChoice, wo: Any, *, reachable_only: Any = Fa
     if choice["glass"] is not None:
         alpha = layers.glass_alpha
         density += choice["glass"] * visible_pdf(wi, h, alpha, alpha) / (4 * c) * reflect_probability(layers, c)
-    if choice["sheen"] is not None and layers.sheen_shape is not None:
-        density += choice["sheen"] * layers.sheen_shape.pdf(wo)
-    if choice["diffuse"] is not None:
-        density += choice["diffuse"] * dr.maximum(wo.z, 0) / dr.pi
+    if normals is None:
+        density += _diffuse_pdf(layers, choice, wo)
     density = dr.select(above & (wi.z > 0), density, 0)
+    if normals is not None:  # part of their side is below the microfacets'
+        diffuse = _diffuse_pdf(layers, choice, about(normals.diffuse, wo))
+        density += dr.select((dr.dot(normals.diffuse, wo) > 0) & (wi.z > 0), diffuse, 0)
     if choice["glass"] is not None:
         alpha = layers.glass_alpha
         h, jacobian, possible = refraction_normal(layers, wo)
@@ -109,6 +110,16 @@ def pdf(layers: Layers, choice: LobeChoice, wo: Any, *, reachable_only: Any = Fa
     if choice["translucent"] is not None:
         density += dr.select(wi.z > 0, choice["translucent"] * dr.maximum(-wo.z, 0) / dr.pi, 0)
     return dr.detach(density)
+
+
+def _diffuse_pdf(layers: Layers, choice: LobeChoice, wo: Any) -> Any:
+    """Density of sheen and diffuse lobes, about whose normal `wo` is."""
+    density: Any = 0
+    if choice["sheen"] is not None and layers.sheen_shape is not None:
+        density += choice["sheen"] * layers.sheen_shape.pdf(wo)
+    if choice["diffuse"] is not None:
+        density += choice["diffuse"] * dr.maximum(wo.z, 0) / dr.pi
+    return density
 
 
 def _coat_pdf(layers: Layers, normal: Any, wo: Any) -> Any:
@@ -134,7 +145,9 @@ def sample(layers: Layers, choice: LobeChoice, u1: Any, u2: Any) -> tuple[Any, A
     phi_sin, phi_cos = dr.sincos(2 * dr.pi * u2.x)
     radius = dr.sqrt(u2.y)
     cosine = vector(radius * phi_cos, radius * phi_sin, dr.safe_sqrt(1 - u2.y))
-    wo, lobe, below = cosine, dr.uint32_array_t(type(u1))(NAMES.index("diffuse")), u1 != u1
+    normals = layers.normals
+    about_diffuse = cosine if normals is None else out_of(normals.diffuse, cosine)
+    wo, lobe, below = about_diffuse, dr.uint32_array_t(type(u1))(NAMES.index("diffuse")), u1 != u1
     chosen, reused, start = {}, u1, 0
     for name, probability in choice.probability.items():
         chosen[name] = (u1 >= start) & (u1 < start + probability)
@@ -155,8 +168,8 @@ def sample(layers: Layers, choice: LobeChoice, u1: Any, u2: Any) -> tuple[Any, A
         for name in ("base", "coat"):
             if name in chosen:
                 wo = dr.select(chosen[name], reflected, wo)
-        if "coat" in chosen and layers.normals is not None:
-            normal, view = layers.normals.coat, about(layers.normals.coat, wi)
+        if "coat" in chosen and normals is not None:
+            normal, view = normals.coat, about(normals.coat, wi)
             h_coat = sample_visible(view, layers.coat_alpha, layers.coat_alpha, u2)
             mirrored = out_of(normal, h_coat * (2 * dr.dot(view, h_coat)) - view)
             wo = dr.select(chosen["coat"], mirrored, wo)
@@ -165,7 +178,8 @@ def sample(layers: Layers, choice: LobeChoice, u1: Any, u2: Any) -> tuple[Any, A
             wo = dr.select(chosen["glass"], dr.select(refracts, through, reflected), wo)
             below |= chosen["glass"] & refracts
     if "sheen" in chosen and layers.sheen_shape is not None:
-        wo = dr.select(chosen["sheen"], layers.sheen_shape.sample(cosine), wo)
+        fibres = layers.sheen_shape.sample(cosine)
+        wo = dr.select(chosen["sheen"], fibres if normals is None else out_of(normals.diffuse, fibres), wo)
     if "translucent" in chosen:
         wo = dr.select(chosen["translucent"], vector(cosine.x, cosine.y, -cosine.z), wo)
         below |= chosen["translucent"]
@@ -173,7 +187,11 @@ def sample(layers: Layers, choice: LobeChoice, u1: Any, u2: Any) -> tuple[Any, A
         wo = dr.select(chosen["transparent"], -wi, wo)
     wo = dr.detach(wo)
     transparent = lobe == NAMES.index("transparent")
-    return wo, lobe, (wi.z > 0) & (transparent | dr.select(below, wo.z < 0, wo.z > 0))
+    above = wo.z > 0
+    if normals is not None:
+        about_it = (lobe == NAMES.index("diffuse")) | (lobe == NAMES.index("sheen"))
+        above = dr.select(about_it, dr.dot(normals.diffuse, wo) > 0, above)
+    return wo, lobe, (wi.z > 0) & (transparent | dr.select(below, wo.z < 0, above))
 
 
 def _through_glass(layers: Layers, h: Any, u1: Any) -> tuple[Any, Any]:

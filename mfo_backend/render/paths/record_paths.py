@@ -42,7 +42,8 @@ class _Hits:
     """First hits of the camera rays on the target, and the number of `pixels`.
 
     Of a mix there is the `plugin`, and `own` are the hits in the frame of the mesh, which its held materials take.
-    `coat` is the normal that a coat has of its own, and `smooth` the mesh's, of a mix whose fitted material has others.
+    Of a material whose lobes have normals of their own `diffuse` is that of diffuse ones; `coat` is that of a coat of
+    its own, and `smooth` the mesh's, of a mix.
     """
 
     si: Any
@@ -54,18 +55,20 @@ class _Hits:
     own: Any = None
     coat: Any = None
     smooth: Any = None
+    diffuse: Any = None
 
     def lit(self, wo: mi.Vector3f) -> mi.Bool:
-        """Whether light from `wo` reaches the material: that below the plane of its microfacets lights other leaves."""
-        return wo.z > 0.0 if self.smooth is None else dr.dot(self.smooth, wo) > 0.0
+        """Whether light from `wo` reaches the material: below the plane of its microfacets may lie what others see."""
+        lit = wo.z > 0.0 if self.smooth is None else dr.dot(self.smooth, wo) > 0.0
+        return lit if self.diffuse is None else lit | (dr.dot(self.diffuse, wo) > 0.0)
 
     def of_rays(self, ray: mi.UInt32) -> _Hits:
         """Those of some rays, which may repeat."""
         si, position, share = (dr.gather(type(a), a, ray) for a in (self.si, self.position, self.share))
-        given = (self.own, self.coat, self.smooth)
-        own, coat, smooth = (None if a is None else dr.gather(type(a), a, ray) for a in given)
+        given = (self.own, self.coat, self.smooth, self.diffuse)
+        own, coat, smooth, diffuse = (None if a is None else dr.gather(type(a), a, ray) for a in given)
         held = tuple(dr.gather(type(a), a, ray) for a in self.held)
-        return _Hits(si, position, share, held, self.pixels, self.plugin, own, coat, smooth)
+        return _Hits(si, position, share, held, self.pixels, self.plugin, own, coat, smooth, diffuse)
 
 
 def record_paths(
@@ -121,15 +124,15 @@ def record_paths(
         own = mi.SurfaceInteraction3f(si) if settings.mixed else None
         if own is not None and below is not None and not walks_free:
             own.duv_dx = mi.Point2f(0.0, 1.0)  # walks take the place of the lobe that stands for them
-        coat, smooth = _other_normals(shape, settings, si)
+        coat, smooth, diffuse = _other_normals(shape, settings, si)
         si = _turned(shape, settings, si)
         sampled = settings.depth > 2 or not lights_have_no_extent(scene)
         if settings.depth == 2 or settings.light_paths is None:
-            si = _without_parametrisation(si)
+            si = _without_parametrisation(si, own_normal=settings.bumped)
         # exact lights alone look at hits once each, and compute them again instead of keeping them
-        dr.eval(si if sampled or settings.mixed else (), own, coat, smooth, position, filter_weight, held)
+        dr.eval(si if sampled or settings.mixed else (), own, coat, smooth, diffuse, position, filter_weight, held)
         plugin = shape.bsdf() if settings.mixed else None
-        hits = _Hits(si, position, filter_weight, held, len(rays.pixel), plugin, own, coat, smooth)
+        hits = _Hits(si, position, filter_weight, held, len(rays.pixel), plugin, own, coat, smooth, diffuse)
         exact = [part for part in _delta_lights(scene, hits, shadows) if dr.width(part.position) > 0]
         if radiance is not None:
             nowhere = dr.zeros(mi.Vector3f, dr.width(position))
@@ -182,12 +185,14 @@ def _camera_rays(scene: mi.Scene, shape: mi.Shape, settings: RecordSettings, wid
     return rays_in(highlight_cells(scene, shape, cells, rays_in, first_hits, settings.highlights))
 
 
-def _without_parametrisation(si: mi.SurfaceInteraction3f) -> mi.SurfaceInteraction3f:
-    """Where hits are and how they are turned: all that lights and proposals ask for."""
+def _without_parametrisation(si: mi.SurfaceInteraction3f, *, own_normal: bool) -> mi.SurfaceInteraction3f:
+    """Where hits are and how they are turned, perhaps with the mesh's normal: all that lights and proposals need."""
     bare = dr.zeros(mi.SurfaceInteraction3f, dr.width(si))
     bare.t, bare.time, bare.wavelengths = si.t, si.time, si.wavelengths
     bare.p, bare.n, bare.sh_frame, bare.wi = si.p, si.n, si.sh_frame, si.wi
     bare.shape, bare.prim_index = si.shape, si.prim_index
+    if own_normal:
+        bare.dn_du, bare.dn_dv = si.dn_du, si.dn_dv
     return bare
 
 
@@ -219,15 +224,15 @@ def _turned(shape: mi.Shape, settings: RecordSettings, si: mi.SurfaceInteraction
 
 def _other_normals(
     shape: mi.Shape, settings: RecordSettings, si: mi.SurfaceInteraction3f
-) -> tuple[mi.Vector3f | None, mi.Vector3f | None]:
-    """The normal that the coat of a bumped material has of its own, and the mesh's where it is mixed with others, both
-    in the frame of its microfacets."""
-    has_coat, has_others = settings.proposal.coat_roughness is not None, settings.bumped and settings.mixed
-    if not (has_coat or has_others):
-        return None, None
+) -> tuple[mi.Vector3f | None, mi.Vector3f | None, mi.Vector3f | None]:
+    """The normal that the coat of a bumped material has of its own, the mesh's where it is mixed with others, and that
+    of its diffuse lobes, all in the frame of its microfacets."""
+    if not settings.bumped:
+        return None, None, None
     plugin: Any = shape.bsdf()
     normals = plugin.bumped_frame(si, mi.Bool(True))[2]
-    return normals["coat_normal"] if has_coat else None, normals["smooth_normal"] if has_others else None
+    coat = normals["coat_normal"] if settings.proposal.coat_roughness is not None else None
+    return coat, normals["smooth_normal"] if settings.mixed else None, normals["bumped_normal"]
 
 
 def _delta_lights(scene: mi.Scene, hits: _Hits, shadows: ShadowRays) -> list[TechniqueLanes]:
@@ -285,15 +290,15 @@ def _sampled_lights(
         value *= shadows.left(passed)
         lit &= dr.max(value) > 0.0
         light_density = ds.pdf * choice
-        mis = light_density / (light_density + proposal.density(si.wi, wo, hits.coat))
+        mis = light_density / (light_density + proposal.density(si.wi, wo, hits.coat, hits.diffuse))
         # what comes straight through a surface is left to light samples: after `before`, `cycles_path` adds none of it
         mis = dr.select(passed.alpha, 1.0, mis)
         started.append(_lit(hits, wo, value * (share * mis / choice * terminator.bend(si, wo, lit)), lit))
 
     lobe, *u = even_points(3, number, tile, tiles, settings.seed + 0x51ED270)
-    wo = proposal.sample(si.wi, lobe, mi.Point2f(*u), hits.coat)
-    density = proposal.density(si.wi, wo, hits.coat)
-    valid = front & (wo.z > 0.0) & (density > 0.0) & leaves_on(scene, si, wo, False)
+    wo = proposal.sample(si.wi, lobe, mi.Point2f(*u), hits.coat, hits.diffuse)
+    density = proposal.density(si.wi, wo, hits.coat, hits.diffuse)
+    valid = front & hits.lit(wo) & (density > 0.0) & leaves_on(scene, si, wo, False)
     ray = shadows.starts.ray(si, si.to_world(wo))
     met = scene.ray_intersect_preliminary(ray, active=valid)
     far = met.compute_surface_interaction(ray, mi.RayFlags.All, valid)
@@ -357,7 +362,7 @@ def _over_others(
     sampler = fresh_sampler(settings.seed + 0x51ED270, dr.width(wo))
     ray = starts.ray(si, si.to_world(wo))
     radiance = traced_radiance(scene, sampler, ray, settings.light_paths, settings.depth - 1, before=before, met=met)
-    return radiance / settings.proposal.density(si.wi, wo, hits.coat)
+    return radiance / settings.proposal.density(si.wi, wo, hits.coat, hits.diffuse)
 
 
 def _lit(hits: _Hits, wo: mi.Vector3f, weight: mi.Color3f, keep: mi.Bool) -> Callable[[], TechniqueLanes]:
@@ -385,7 +390,7 @@ def _parted(lanes: TechniqueLanes, hits: _Hits, index: mi.UInt32) -> TechniqueLa
     """Lanes of a mix: what its held materials show, and weights for the fitted one, or all that may change, alone."""
     own = dr.gather(mi.SurfaceInteraction3f, hits.own, index)
     wo = lanes.wo
-    if hits.plugin.directions:
+    if hits.plugin.bumped:
         wo = own.to_local(dr.gather(mi.SurfaceInteraction3f, hits.si, index).to_world(wo))
     others = hits.plugin.held_value(own, wo) * lanes.weight
     weight = lanes.weight if hits.plugin.is_open else lanes.weight * hits.plugin.fitted.weight_at(own)

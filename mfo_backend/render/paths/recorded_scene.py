@@ -107,7 +107,7 @@ class RecordedScene:
         walks = self._walks and not (self._mixed and bsdf.walks_are_held)
         self.model = recorded_model(renderer.model, bsdf, renderer.mix, glows=self._glows, walks=walks)
         self._fixed = self.model.values(values_in_scene(renderer.shape.bsdf(), self.model), renderer.table.names)
-        self._bumped = bool(getattr(renderer.shape.bsdf(), "directions", ()))
+        self._bumped = bool(getattr(renderer.shape.bsdf(), "bumped", False))
         self._fixed |= dict.fromkeys((*self.model.normals.names, *self.model.walks.names))
         self.graph = graph or renderer.graph
         varying = partial(VaryingValues, table=renderer.table, sizes=self.model.table)

@@ -23,6 +23,7 @@ from ..machine.plugins import check_plugins
 from ..machine.variant import load_variant
 from ..models.blender_model import prepare_several_blender_principled
 from ..models.graph_pictures import GraphPictures, Shown
+from ..models.leaning_normals import tell_own_normals
 from ..models.material_model import material_model
 from ..models.prepared_material import RADIANCE_KEY, Materials, PreparedMaterial
 from .pass_counter import PassCounter
@@ -346,6 +347,7 @@ def _use_cycles_path(document: Element, plugin: str, properties: Mapping[str, fl
             hides.set("value", "false")
         camera_world.set("name", CAMERA_WORLD)
         integrator.append(camera_world)
+    tell_own_normals(document)
     for bsdf in document.iter("bsdf"):
         if bsdf.get("type") == "blender_principled":
             ElementTree.SubElement(bsdf, "boolean", name="filtered", value="true")

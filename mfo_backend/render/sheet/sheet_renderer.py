@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from ...types.image import Pixels, Pullback
 from ...types.parameter import Vector
+from ..models.leaning_normals import share_own_normals
 from ..pictures.mitsuba_renderer import MitsubaRenderer
 from .contact_sheet import ContactSheet
 
@@ -35,6 +36,7 @@ class SheetRenderer:
     ) -> None:
         first = renderers[0]
         self.renderers = tuple(renderers)
+        share_own_normals([r.shape.bsdf() for r in renderers], [r.scene.integrator() for r in renderers])
         self.model, self.table, self.start = first.model, first.table, first.start
         self.light_paths, self.counter, self.graph = first.light_paths, first.counter, first.graph
         for renderer in renderers:

@@ -38,7 +38,8 @@ TRANSMITS = mi.BSDFFlags.GlossyTransmission | mi.BSDFFlags.DeltaTransmission | m
 class CyclesPath(RBIntegrator):
     """`max_depth`, `hide_emitters` as `prb`, further the numbers of `LightPaths` by name.
 
-    A nested texture `camera_world` is what rays straight from the camera see behind everything (`camera_world`).
+    `own_normals` says that some materials tell the mesh's normals from those that are bent to the view. A nested
+    texture `camera_world` is what rays straight from the camera see behind everything (`camera_world`).
     """
 
     def __init__(self, props: mi.Properties) -> None:
@@ -46,6 +47,7 @@ class CyclesPath(RBIntegrator):
         self.filter_glossy = float(props.get("filter_glossy", 0.0))
         self.clamp_indirect = float(props.get("clamp_indirect", 0.0))
         self.camera_world = props.get("camera_world", None)
+        self.own_normals = bool(props.get("own_normals", False))
         self.transparent_bounces = int(props.get("transparent_bounces", TRANSPARENT_BOUNCES))
         self.limits = tuple(int(props.get(name, NO_LIMIT)) for name in _LIMITS)
 

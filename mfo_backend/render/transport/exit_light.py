@@ -61,7 +61,7 @@ def light_from_below(
             continue
         entered = dr.gather(mi.SurfaceInteraction3f, si, lane)
         below = material.below(entered, mi.Bool(True))
-        if material.walked.directions:
+        if material.walked.bumped:
             entered.sh_frame, entered.wi, _ = material.walked.bumped_frame(entered, mi.Bool(True))
         entered.sh_frame.n = dr.mulsign(entered.sh_frame.n, entered.wi.z)
         entered.wi.z = dr.abs(entered.wi.z)

@@ -20,6 +20,7 @@ import mitsuba as mi
 import numpy as np
 
 from ...material.arrays.own_memory import own_memory
+from ...material.plugins.own_normal import keep_own_normal
 
 GEOMETRY_OFFSET, SHADING_OFFSET = "shadow_geometry_offset", "shadow_shading_offset"
 # Cosine between the normals of a triangle's corners above which its own shadow lies in the last 0.6 degrees of the
@@ -117,8 +118,9 @@ def seen_side(scene: mi.Scene, si: mi.SurfaceInteraction3f) -> mi.SurfaceInterac
 
     That is Cycles' rule for glossy lobes (kernel/closure/bsdf_util.h, ensure_valid_specular_reflection): the mirrored
     view is lifted to a cosine of 0.01, or 0.9 of the view's own. It matters near the outline of a coarse mesh and for
-    custom normals. Cycles leaves diffuse lobes at the normal they had; a frame here is that of all lobes. Mitsuba's
-    integrators bend nothing: the light that a smooth metal of 9,500 triangles sends to itself is an eighth less.
+    custom normals. Cycles leaves diffuse lobes at the normal they had: materials with `own_normals` ask the surface
+    point for that, and of all others the frame is that of all lobes. Mitsuba's integrators bend nothing: the light that
+    a smooth metal of 9,500 triangles sends to itself is an eighth less.
     """
     if not follows_cycles(scene):
         return si
@@ -139,6 +141,8 @@ def seen_side(scene: mi.Scene, si: mi.SurfaceInteraction3f) -> mi.SurfaceInterac
     root = dr.safe_sqrt(b * b - 4.0 * a * c)
     z = dr.minimum(0.25 * (b + dr.select(along < 0.0, root, -root)) / dr.maximum(a, 1e-20), 1.0)
     bent = dr.normalize(dr.safe_sqrt(1.0 - z) * across + dr.safe_sqrt(z) * facet)
+    if getattr(scene.integrator(), "own_normals", False):
+        keep_own_normal(si, normal)
     n = mi.Normal3f(dr.select(below, side * bent, mi.Vector3f(si.sh_frame.n)))
     s = dr.select(below, dr.normalize(dr.fma(-n, dr.dot(n, si.sh_frame.s), si.sh_frame.s)), si.sh_frame.s)
     t = dr.select(below, dr.cross(n, s), si.sh_frame.t)

@@ -156,3 +156,29 @@ def test_a_coat_is_drawn_about_its_own_normal() -> None:
     assert integral > 0.03
     assert weights.mean() == pytest.approx(integral, rel=0.02)
     assert weights.std() < 0.5 * integral
+
+
+@pytest.mark.parametrize("name", ["plastic", "sheen alone", "glass", "mixture"])
+def test_diffuse_lobes_are_drawn_about_a_normal_that_turns_away(name: str) -> None:
+    """A mesh's normal 105 degrees off the view: without light from below the microfacets' plane a fifth is lost."""
+    away = {"smooth_normal": mi.Vector3f(*unit(65, 30))}
+    layers, choice = stack({k: _known(v) for k, v in MATERIALS[name].items()} | away, unit(40, 210))
+    directions, solid_angle = grid()
+    reachable = np.array(pdf(layers, choice, directions, reachable_only=True)) > 0
+    values = np.array(evaluate(layers, directions)) * solid_angle
+    integral = (values * reachable).sum(axis=1)
+    drawn, valid = draw(layers, choice)
+    density = pdf(layers, choice, drawn)
+    weights = np.array(dr.select(valid & (density > 0), evaluate(layers, drawn) / density, 0))
+    error = weights.std(axis=1) / np.sqrt(COUNT)
+    assert np.all(np.abs(weights.mean(axis=1) - integral) < 4 * error + 2e-4), (weights.mean(axis=1), integral)
+    above = np.array(directions.z) > 0
+    below = (values * ~above).sum() / values.sum()
+    if name in ("plastic", "sheen alone"):  # without what glass lets through
+        assert below > 0.05
+        # all of it can be drawn: a lobe that has no direction there is left to chance alone
+        assert (values * ~reachable).sum() < 1e-3 * values.sum()
+
+
+def _known(value: Any) -> Any:
+    return mi.Color3f(*value) if isinstance(value, tuple) else mi.Float(value)

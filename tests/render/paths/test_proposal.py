@@ -55,3 +55,19 @@ def test_a_coat_with_a_normal_of_its_own_has_a_lobe_there():
     assert np.mean(ratio * np.array(wo.z)) == pytest.approx(np.pi, rel=0.015)
     mirrored = 2.0 * dr.dot(wi, coat) * coat - wi
     assert proposal.density(wi, mirrored, coat)[0] > 100.0 * proposal.density(wi, mirrored)[0]
+
+
+def test_the_cosine_lobe_follows_the_normal_of_diffuse_lobes():
+    proposal, diffuse = DefensiveProposal.around(0.5), mi.Vector3f(0.8, 0.0, 0.6)
+    n = 400_000
+    wi = mi.Vector3f(0.0, 0.6, 0.8)
+    sampler = mi.load_dict({"type": "independent"})
+    sampler.seed(1, n)
+    wo = proposal.sample(wi, sampler.next_1d(), sampler.next_2d(), None, diffuse)
+    density, along = (np.array(a) for a in (proposal.density(wi, wo, None, diffuse), dr.dot(wo, diffuse)))
+    valid = (along > 0) & (density > 0)
+    ratio = np.where(valid, 1.0 / np.maximum(density, 1e-9), 0.0)
+    # all light about that normal, a fifth of which comes from below the microfacets' plane
+    assert np.mean(ratio * np.maximum(along, 0.0)) == pytest.approx(np.pi, rel=0.01)
+    below = np.array(wo.z) < 0
+    assert np.mean(ratio * np.maximum(along, 0.0) * below) == pytest.approx(np.pi * 0.2, rel=0.03)

@@ -17,7 +17,8 @@ from mfo_backend.render.machine.variant import load_variant
 
 VARIANT, COUNT = load_variant(), 2000
 # all that the rules ask a scene for
-OF_CYCLES = SimpleNamespace(integrator=lambda: SimpleNamespace(transparent_bounces=8))
+OF_CYCLES = SimpleNamespace(integrator=lambda: SimpleNamespace(transparent_bounces=8, own_normals=False))
+TELLING = SimpleNamespace(integrator=lambda: SimpleNamespace(transparent_bounces=8, own_normals=True))
 
 
 @pytest.fixture(autouse=True)
@@ -58,6 +59,25 @@ def test_the_mirrored_view_is_above_the_triangle(side: float) -> None:
     along = before - n * (n * before).sum(axis=0)
     np.testing.assert_allclose(s, along / np.linalg.norm(along, axis=0), atol=1e-3)
     np.testing.assert_allclose(np.array(found.to_world(found.wi)), view, atol=1e-5)
+
+
+@pytest.mark.parametrize("side", [1.0, -1.0], ids=["front", "back"])
+def test_a_point_knows_the_meshs_normal_where_materials_tell_two(side: float) -> None:
+    from mfo_backend.material.plugins.own_normal import own_normal
+    from mfo_backend.render.transport.smooth_facets import seen_side
+
+    def met() -> mi.SurfaceInteraction3f:
+        si = dr.zeros(mi.SurfaceInteraction3f, COUNT)
+        si.n = mi.Normal3f(0.0, 0.0, 1.0)
+        si.sh_frame = mi.Frame3f(mi.Vector3f(*unit(0.3, 2)))
+        si.dn_du, si.dn_dv = mi.Vector3f(1.0, 0.0, 0.0), mi.Vector3f(0.0, 1.0, 0.0)  # as of a curved surface
+        si.wi = si.to_local(mi.Vector3f(*(side * unit(0.02, 1))))
+        return si
+
+    none = mi.Vector3f(0.0, 0.0, 0.0)
+    np.testing.assert_allclose(np.array(own_normal(seen_side(TELLING, met()), none)), side * unit(0.3, 2), atol=1e-6)
+    assert not np.array(own_normal(seen_side(OF_CYCLES, met()), none)).any()
+    assert not np.array(own_normal(met(), none)).any()
 
 
 @pytest.mark.parametrize("flipped", [False, True], ids=["seen from outside", "its back is seen"])
