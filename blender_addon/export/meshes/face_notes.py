@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What is said of faces and normals once all meshes are placed. Knows nothing of bpy."""
+"""What is said of faces once all meshes are placed. Knows nothing of bpy."""
 
 from __future__ import annotations
 
@@ -12,16 +12,11 @@ from ..camera.camera_model import Camera
 from ..files.ply_file import TriangleMesh
 from ..findings import Findings
 from ..steps import Pause, Steps
-from .bent_normals import share_of_bent_normals
 from .coincident import COPLANAR, most_around
 from .known_meshes import KnownMeshes
 
 MANY = 100_000  # triangles that windows are drawn before: what is computed with them takes a tenth of a second
 APART = Pause(holds_scene=True, is_apart=True)
-# of the target's area; 0.09 on a ball of 12 segments, whose diffuse light is 0.6 % off, 0.02 on one of 24
-MOST_BENT = 0.05
-MOST_BENT_OF_SMOOTH = 0.2  # of other objects without flat faces: a cube, 0.66 of it, was off by blocks of 16 %
-MOST_OTHERS = 3  # objects beside those that are fitted which are named for it: the worst tell of the kind
 
 
 def note_coincident_faces(
@@ -70,25 +65,3 @@ def _same_place(first: str, second: str) -> str:
         f"'{first}' and '{second}' have faces in the same place: which of them is seen is left to chance, in "
         "Cycles and in the fit."
     )
-
-
-def note_bent_normals(
-    own: Mapping[str, TriangleMesh],
-    others: Mapping[str, TriangleMesh],
-    most: Mapping[str, float],
-    camera: Camera,
-    findings: Findings,
-) -> None:
-    """Report objects of these names whose normals turn away from the camera: those that are fitted, and others.
-
-    Of the others `most` is the share that may.
-    """
-    shares = {name: share_of_bent_normals(mesh, camera) for name, mesh in {**others, **own}.items()}
-    worst = sorted((name for name in shares if name not in own), key=lambda name: -shares[name])
-    for name in (*own, *worst[:MOST_OTHERS]):
-        if shares[name] > (MOST_BENT if name in own else most[name]):
-            findings.note(
-                f"Object '{name}' is smooth over few faces, or has custom normals: on {100 * shares[name]:.0f} % of it "
-                "normals turn away from the camera. There Cycles bends them for reflections alone, the fit for all "
-                "light."
-            )

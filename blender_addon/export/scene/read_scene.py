@@ -28,15 +28,7 @@ from ..materials.baked_material import refuse_dark
 from ..materials.read_context import needs_bake, read_context
 from ..materials.read_material import name_material_settings, read_target
 from ..materials.unfinite_pixels import refuse_unfinite_pixels
-from ..meshes.face_notes import (
-    APART,
-    MANY,
-    MOST_BENT,
-    MOST_BENT_OF_SMOOTH,
-    note_bent_normals,
-    note_coincident_faces,
-    note_coplanar_faces,
-)
+from ..meshes.face_notes import APART, MANY, note_coincident_faces, note_coplanar_faces
 from ..meshes.known_meshes import KnownMeshes
 from ..meshes.mesh_arrays import CornerMesh, Piece, joined
 from ..meshes.read_mesh import MESH_TYPES, material_of_slot, read_mesh, slot_count
@@ -217,7 +209,6 @@ class _Walk:
         self.bodies = 0
         self.places: list[tuple[str, TriangleMesh]] = []
         self.seen: dict[str, NDArray[np.float64]] = {}  # points of each object that is fitted
-        self.leaning_normals: dict[str, float] = {}  # the share of an object's normals that may turn away unnamed
         data.target_count = len(targets)
         self.bsdfs: dict[str, str] = {}
         for number, (each, material) in enumerate(zip(targets, materials, strict=True)):
@@ -311,9 +302,6 @@ class _Walk:
             return
         note_visibility(instance, self.findings)
         hidden = camera_misses(instance, self.depsgraph.view_layer)
-        if item.data.has_custom_normals or item.data.normals_domain != "FACE":
-            is_smooth = item.data.normals_domain == "POINT" and not item.data.has_custom_normals
-            self.leaning_normals[item.name] = MOST_BENT_OF_SMOOTH if is_smooth else MOST_BENT
         last = max(slot_count(item) - 1, 0)
         slots = np.clip(mesh.slots, 0, last)
         bsdfs = {int(slot): self._bsdf(item, int(slot)) for slot in np.unique(slots)}
@@ -369,14 +357,11 @@ class _Walk:
             )
 
     def note_faces(self) -> Steps[None]:
-        """Report faces that lie in the same place, normals that turn away from the camera, and what is far away."""
+        """Report faces that lie in the same place, and what is far away."""
         yield from note_coincident_faces(self.places, self.known, self.findings)
         yield from note_coplanar_faces(self.seen, self.places, self.data.camera, self.findings)
         shapes = [self.data.target_of(number) for number in range(len(self.targets))]
         there = [(each, shape) for each, shape in zip(self.targets, shapes, strict=True) if shape is not None]
-        own = {each.object.name: shape.mesh for each, shape in there}
-        others = dict(reversed([place for place in self.places if place[0] in self.leaning_normals]))
-        note_bent_normals(own, others, self.leaning_normals, self.data.camera, self.findings)
         note_far_scattering(self.data, there, self.findings)
 
     def _bsdf(self, item: bpy.types.Object, slot: int) -> str:
