@@ -96,10 +96,10 @@ def pdf(layers: Layers, choice: LobeChoice, wo: Any, *, reachable_only: Any = Fa
         alpha = layers.glass_alpha
         density += choice["glass"] * visible_pdf(wi, h, alpha, alpha) / (4 * c) * reflect_probability(layers, c)
     if normals is None:
-        density += _diffuse_pdf(layers, choice, wo)
+        density = _with_diffuse(density, layers, choice, wo)
     density = dr.select(above & (wi.z > 0), density, 0)
     if normals is not None:  # part of their side is below the microfacets'
-        diffuse = _diffuse_pdf(layers, choice, about(normals.diffuse, wo))
+        diffuse = _with_diffuse(0, layers, choice, about(normals.diffuse, wo))
         density += dr.select((dr.dot(normals.diffuse, wo) > 0) & (wi.z > 0), diffuse, 0)
     if choice["glass"] is not None:
         alpha = layers.glass_alpha
@@ -112,9 +112,8 @@ def pdf(layers: Layers, choice: LobeChoice, wo: Any, *, reachable_only: Any = Fa
     return dr.detach(density)
 
 
-def _diffuse_pdf(layers: Layers, choice: LobeChoice, wo: Any) -> Any:
-    """Density of sheen and diffuse lobes, about whose normal `wo` is."""
-    density: Any = 0
+def _with_diffuse(density: Any, layers: Layers, choice: LobeChoice, wo: Any) -> Any:
+    """A density and those of sheen and diffuse lobes, about whose normal `wo` is."""
     if choice["sheen"] is not None and layers.sheen_shape is not None:
         density += choice["sheen"] * layers.sheen_shape.pdf(wo)
     if choice["diffuse"] is not None:

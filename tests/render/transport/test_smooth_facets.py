@@ -7,6 +7,7 @@ Directions that leave on their own side of a triangle: by signs.
 from __future__ import annotations
 
 from types import SimpleNamespace
+from typing import Any
 
 import drjit as dr
 import mitsuba as mi
@@ -17,8 +18,8 @@ from mfo_backend.render.machine.variant import load_variant
 
 VARIANT, COUNT = load_variant(), 2000
 # all that the rules ask a scene for
-OF_CYCLES = SimpleNamespace(integrator=lambda: SimpleNamespace(transparent_bounces=8, own_normals=False))
-TELLING = SimpleNamespace(integrator=lambda: SimpleNamespace(transparent_bounces=8, own_normals=True))
+OF_CYCLES: Any = SimpleNamespace(integrator=lambda: SimpleNamespace(transparent_bounces=8, own_normals=False))
+TELLING: Any = SimpleNamespace(integrator=lambda: SimpleNamespace(transparent_bounces=8, own_normals=True))
 
 
 @pytest.fixture(autouse=True)
