@@ -84,6 +84,14 @@ CASES: dict[str, tuple[Any, dict[str, Any]]] = {
         mix(0.3, bumped(DIFFUSE, 3.0), bumped(COATED, 5.0, "Coat Normal")),
         {"Mix Shader/Factor": 0.6, "Principled BSDF/Base Color": RED},
     ),
+    "normals that lean from their faces": (
+        mix(0.4, DIFFUSE, GLOSSY),
+        {"Mix Shader/Factor": 0.2, "Glossy BSDF/Color": (0.1, 0.6, 0.3), "Glossy BSDF/Roughness": 0.55},
+    ),
+    "normals that lean, below a sheen and a coat": (
+        mix(0.3, SHEEN, COATED),
+        {"Mix Shader/Factor": 0.6, "Principled BSDF/Base Color": RED},
+    ),
     "displaced, the other one bumped": (
         displaced(mix(0.4, DIFFUSE, bumped(GLOSSY, 4.0))),
         {"Mix Shader/Factor": 0.7, "Glossy BSDF/Color": (0.1, 0.6, 0.3), "Glossy BSDF/Roughness": 0.55},
@@ -94,6 +102,14 @@ CASES: dict[str, tuple[Any, dict[str, Any]]] = {
 def mix_node_input(material: Any) -> str:
     """What this Blender calls the factor of a Mix Shader."""
     return next(node for node in material.node_tree.nodes if node.type == "MIX_SHADER").inputs[0].name
+
+
+def box(material: Any) -> Any:
+    """A smooth cube, two thirds of which would mirror the view into itself."""
+    bpy.ops.mesh.primitive_cube_add(size=1.6, rotation=(0.4, 0.3, 0.2))
+    bpy.ops.object.shade_smooth()
+    bpy.context.object.data.materials.append(material)
+    return bpy.context.object
 
 
 def named(request: dict[str, Any]) -> list[str]:
@@ -132,7 +148,7 @@ def test_pictures_at_other_values_are_cycles(
     material = material_of(build)
     factor = mix_node_input(material)
     others = {name.replace("Factor", factor): value for name, value in others.items()}
-    target = ball(material)
+    target = box(material) if "lean" in name else ball(material)
     values = [value.name for value in mix_values(target_shader(material)) if value.by_default or value.factor]
     fit = {"parameters": ["base_color", "roughness", *values]}
     report = export(target, fit=fit)
