@@ -20,20 +20,29 @@ def keep_alphas(trees: Iterable[bpy.types.NodeTree]) -> None:
     (`ImageTextureNode::compile`).
     """
     for tree in trees:
-        links = list(tree.links)
-        shown = _reaching(tree, links)
-        for node in [node for node in tree.nodes if node.bl_idname == "ShaderNodeTexImage"]:
+        for color, alpha, ends in _divided(tree):
+            both = tree.nodes.new("ShaderNodeMix")
+            both.data_type, both.blend_type, both.clamp_factor = "RGBA", "ADD", False
+            both.inputs[0].default_value = TRACE
+            first, second = (socket for socket in both.inputs if socket.type == "RGBA")
+            tree.links.new(color, first)
+            tree.links.new(alpha, second)
+            for end in ends:
+                tree.links.new(next(socket for socket in both.outputs if socket.type == "RGBA"), end)
+
+
+def _divided(
+    tree: bpy.types.NodeTree,
+) -> list[tuple[bpy.types.NodeSocket, bpy.types.NodeSocket, list[bpy.types.NodeSocket]]]:
+    """Color and Alpha of each Image Texture that is read by both, and where its Color goes."""
+    links = list(tree.links)  # which are no more once a new one takes the place of any
+    shown, found = _reaching(tree, links), []
+    for node in tree.nodes:
+        if node.bl_idname == "ShaderNodeTexImage":
             color, alpha = node.outputs["Color"], node.outputs["Alpha"]
             if any(link.from_socket == alpha and link.to_node.as_pointer() in shown for link in links):
-                ends = [link.to_socket for link in links if link.from_socket == color]
-                both = tree.nodes.new("ShaderNodeMix")
-                both.data_type, both.blend_type, both.clamp_factor = "RGBA", "ADD", False
-                both.inputs[0].default_value = TRACE
-                first, second = (socket for socket in both.inputs if socket.type == "RGBA")
-                tree.links.new(color, first)
-                tree.links.new(alpha, second)
-                for end in ends:
-                    tree.links.new(next(socket for socket in both.outputs if socket.type == "RGBA"), end)
+                found.append((color, alpha, [link.to_socket for link in links if link.from_socket == color]))
+    return found
 
 
 def _reaching(tree: bpy.types.NodeTree, links: list[bpy.types.NodeLink]) -> set[int]:

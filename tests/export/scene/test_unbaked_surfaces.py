@@ -15,6 +15,7 @@ import pytest
 from .test_baked_surfaces import Nodes, shape_of, stage
 
 __all__ = ["stage"]  # the fixture
+PICTURES = 40
 
 
 def test_a_missing_image_is_magenta_and_named(stage: Any, export: Any) -> None:
@@ -97,3 +98,27 @@ def test_a_surface_with_two_sides_is_said(asked: bool, stage: Any, export: Any) 
     )
     said = "Material 'Ball' asks for Backfacing: in the fit both sides are as its front is."
     assert (said in export(target).notes) is asked
+
+
+def test_many_pictures_that_are_read_by_colour_and_alpha(stage: Any, export: Any) -> None:
+    """A bake keeps their alphas by new links, and asked the old ones, which were no more: Blender ended."""
+    target, _, nodes = stage
+    link, image = nodes.tree.links.new, bpy.data.images.new("Shown", 8, 8, alpha=True)
+    image.generated_color = (0.2, 0.5, 0.8, 0.5)
+    color = alpha = None
+    for _ in range(PICTURES):
+        picture, colors, alphas = nodes.new("TexImage"), nodes.new("MixRGB"), nodes.new("Math")
+        picture.image, alphas.operation = image, "MAXIMUM"
+        for output, mixed, last in (
+            (picture.outputs["Color"], colors, color),
+            (picture.outputs["Alpha"], alphas, alpha),
+        ):
+            link(output, mixed.inputs[-1])
+            link(output if last is None else last, mixed.inputs[-2])
+        color, alpha = colors.outputs[0], alphas.outputs[0]
+    link(color, nodes.principled.inputs["Base Color"])
+    link(alpha, nodes.principled.inputs["Metallic"])
+    report = export(target)
+    assert not any("could not be baked" in note for note in report.notes)
+    sockets = report.request["materials"][shape_of(report)[0]]["sockets"]
+    assert sockets["Metallic"]["value"] == pytest.approx(0.5, abs=0.005)
