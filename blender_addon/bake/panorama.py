@@ -126,7 +126,10 @@ def _render(
     copy.cycles_visibility.camera = True
     copy.cycles.sampling_method = "NONE"  # nothing is lit here, and the map for it takes longer than the picture
     for number, (owner, name) in enumerate(_discs(tree)):
-        owner.nodes[name].sun_disc = number in discs
+        node = owner.nodes[name]
+        for link in [link for socket in node.inputs for link in socket.links]:  # a Vector is not read beside a disc
+            owner.links.remove(link)
+        node.sun_disc = number in discs
     studio.world = copy
     studio.render.resolution_x, studio.render.resolution_y = size
     studio.cycles.samples = samples

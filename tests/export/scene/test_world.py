@@ -9,7 +9,7 @@ from xml.etree import ElementTree
 import bpy
 import numpy as np
 import pytest
-from mathutils import Vector
+from mathutils import Matrix, Vector
 
 from blender_addon.export.job import check_export
 from mfo_backend.scene.image_file import read_image
@@ -221,6 +221,33 @@ def test_sun_of_a_sky_becomes_a_lamp(scene: Any, export: Any, render_cycles: Any
     assert float(lamp.find("float[@name='angle']").get("value")) == pytest.approx(np.degrees(sky.sun_size), rel=1e-4)
     expected, found = tiles(render_cycles()), tiles(render_mitsuba(report, 256))
     np.testing.assert_allclose(found.mean(axis=0), expected.mean(axis=0), rtol=0.01)
+
+
+@pytest.mark.parametrize("disc", [True, False])
+def test_a_sky_with_its_disc_does_not_read_what_is_linked_to_vector(
+    disc: bool, scene: Any, export: Any, render_cycles: Any, render_mitsuba: Any
+) -> None:
+    """Blender hides the socket then: with the link the sky was turned in the fit alone."""
+    tree, background = world_nodes(scene)
+    sky, turned = tree.nodes.new("ShaderNodeTexSky"), tree.nodes.new("ShaderNodeMapping")
+    turned.inputs["Rotation"].default_value, sky.sun_disc = (0.5, 0.3, 2.0), False
+    tree.links.new(tree.nodes.new("ShaderNodeTexCoord").outputs["Generated"], turned.inputs["Vector"])
+    tree.links.new(turned.outputs[0], sky.inputs["Vector"])
+    sky.sun_elevation, sky.sun_rotation, sky.sun_disc = 0.3, 3.0, disc  # the sun is out of view
+    tree.links.new(sky.outputs[0], background.inputs["Color"])
+    background.inputs["Strength"].default_value = 0.1
+    scene.render.resolution_x = scene.render.resolution_y = 32
+    camera = add_camera("PERSP", rotation=(1.6, 0.0, 0.7), lens=18.0)
+    target = add_quad("Target", 0.1, 0.0, new_material("Target"))
+    bpy.context.view_layer.update()
+    target.matrix_world = camera.matrix_world @ Matrix.Translation((0.0, 0.0, -3.0))
+    report = export(target)
+    pictures = [picture[..., :3].reshape(4, 8, 4, 8, 3).mean(axis=(1, 3)) for picture in (
+        render_cycles(), render_mitsuba(report, 64)
+    )]  # fmt: skip
+    around = np.ones((4, 4), bool)
+    around[1:3, 1:3] = False  # where the target is
+    np.testing.assert_allclose(pictures[1][around], pictures[0][around], rtol=0.02)
 
 
 def test_world_that_cannot_be_rendered_is_an_error(scene: Any, export: Any, monkeypatch: Any, tmp_path: Any) -> None:
