@@ -10,7 +10,7 @@ from typing import NamedTuple
 import bpy
 from mathutils import Matrix
 
-from ..export.render_state import shown_by
+from ..export.render_state import is_edited, shown_by
 from ..versions import keeps_data_below_subdivision
 
 NAME = "material_fit_bake"
@@ -153,10 +153,10 @@ def _copy_what_nodes_ask_for(shown: bpy.types.Object, item: bpy.types.Object) ->
 def _copy_properties_of_data(shown: bpy.types.Object, into: bpy.types.ID) -> None:
     """Give an ID the custom properties of what a depsgraph's object shows; a modifier that makes a new mesh has none.
 
-    Attribute finds them after those of the object.
+    Nor has a mesh that is edited. Attribute finds them after those of the object.
     """
     original = shown.original
-    if not original.data.keys():
+    if not original.data.keys() or is_edited(original):
         return
     rendered = [modifier for modifier in original.modifiers if modifier.show_render]
     if not (rendered and rendered[-1].type == "SUBSURF" and keeps_data_below_subdivision()):

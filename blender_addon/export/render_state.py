@@ -132,11 +132,11 @@ def layer_collections(view_layer: bpy.types.ViewLayer) -> Iterator[bpy.types.Lay
 
 
 def _use_render_settings(item: bpy.types.Object, put: Any) -> None:
-    is_edited = _is_edited(item)
+    edited = is_edited(item)
     for modifier in item.modifiers:
-        if not is_edited:
+        if not edited:
             put(modifier, "show_viewport", modifier.show_render)
-        if modifier.type in RENDER_TWINS and not (is_edited and _is_off_while_edited(modifier)):
+        if modifier.type in RENDER_TWINS and not (edited and _is_off_while_edited(modifier)):
             viewport, render = RENDER_TWINS[modifier.type]
             put(modifier, viewport, getattr(modifier, render))
     for system in item.particle_systems:
@@ -175,7 +175,7 @@ def note_viewport(depsgraph: bpy.types.Depsgraph, findings: Findings) -> None:
                 f"Object '{original.name}' is in Sculpt Mode, where its modifiers are not as in a render: leave Sculpt "
                 "Mode before the fit."
             )
-        if _is_edited(original) and _differs_while_edited(original):
+        if is_edited(original) and _differs_while_edited(original):
             findings.note(
                 f"The mesh of '{original.name}' is in Edit Mode, where Cycles renders modifiers and shape keys as Edit "
                 "Mode shows them: leave it before the fit, unless the reference was made in it."
@@ -188,7 +188,7 @@ def note_viewport(depsgraph: bpy.types.Depsgraph, findings: Findings) -> None:
                 )
 
 
-def _is_edited(item: bpy.types.Object) -> bool:
+def is_edited(item: bpy.types.Object) -> bool:
     """Whether Blender evaluates an object for Edit Mode, in a render, too: its mesh is edited, by whichever object."""
     return item.type == "MESH" and item.data.is_editmode
 

@@ -79,6 +79,31 @@ def test_a_property_of_the_mesh_is_gone_where_a_modifier_makes_a_new_one(
     assert (baked.max() < 1e-4) == is_lost
 
 
+@pytest.mark.parametrize("by_other", [False, True])
+@pytest.mark.parametrize("modifiers", [(), ("SUBSURF",)], ids=["plain", "subdivided"])
+def test_a_mesh_that_is_edited_has_no_properties(
+    modifiers: tuple[str, ...], by_other: bool, stage: Any, export: Any, render_cycles: Any
+) -> None:
+    target, box = stage
+    box.data["tint"] = (0.2, 0.5, 0.8)
+    for modifier in modifiers:
+        box.modifiers.new("Modifier", modifier)
+    edited = box
+    if by_other:
+        edited = bpy.data.objects.new("Edited", box.data)
+        edited.location.x = -9.0
+        bpy.context.scene.collection.objects.link(edited)
+    told = box.data.materials[0].node_tree.nodes.new("ShaderNodeAttribute")
+    told.attribute_type, told.attribute_name = "OBJECT", "tint"
+    bpy.context.view_layer.objects.active = edited
+    edited.select_set(True)
+    bpy.ops.object.mode_set(mode="EDIT")
+    picture, baked = shown_and_baked(told, target, export, render_cycles)
+    assert len(baked) == 1 + by_other
+    np.testing.assert_allclose(baked, [picture[CENTRE][:3]] * len(baked), atol=1e-4)
+    assert np.max(baked) < 1e-4
+
+
 @pytest.mark.parametrize("is_shown", [False, True])
 def test_an_instance_has_the_colour_of_its_instancer(
     is_shown: bool, stage: Any, export: Any, render_cycles: Any
