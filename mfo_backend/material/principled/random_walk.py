@@ -34,7 +34,11 @@ WALK = ParameterTable(
 MOST_COLLISIONS = 256  # of a walk, as in Cycles; a longer one is lost
 SHORTENED = 0.25 / 3.14159265  # mean free path of a radius, which says how far light spreads, outside of skin
 LEAST_ALBEDO = 0.2  # of a collision; below it a walk carries less instead
+MOST_ALBEDO = 0.999999
 LEAST_PATH = 1e-8  # scene units
+# What brightens skin shortens its paths, by the last middle of so many; darker and brighter skin has an end of them.
+# One step more or less is paths of another length: half of those of white skin take more than `MOST_COLLISIONS`
+BISECTIONS, DARKEST_SKIN, BRIGHTEST_SKIN = 12, 1e-4, 0.995
 LEAST_INDEX, MOST_INDEX = 1.01, 3.8
 MOST_ANISOTROPY, MOST_OF_PATHS = 0.9, 0.99  # the second where the radius is the mean free path
 # Of the interface, alpha. What enters is bent by a third of what a microfacet is, so a narrower lobe looks the same
@@ -94,7 +98,7 @@ class Medium:
 
     @staticmethod
     def _of(albedo: Any, path: Any, g: Any) -> Medium:
-        albedo = dr.minimum(at_least(albedo, 1e-6), 0.999999)
+        albedo = dr.minimum(at_least(albedo, 1e-6), MOST_ALBEDO)
         share = dr.minimum(albedo / LEAST_ALBEDO, 1)
         return Medium(at_least(albedo, LEAST_ALBEDO), dr.rcp(path), share, g)
 
@@ -178,20 +182,19 @@ def _polynomial(row: tuple[float, ...], g: Any) -> Any:
 
 def _albedo_in_skin(colour: Any, index: Any) -> Any:
     """The reduced albedo of the dipole that reflects `colour` (H. Jensen, J. Buhler, "A Rapid Hierarchical Rendering
-    Technique for Translucent Materials", 2002), by bisection and a step of Newton, which has the slopes."""
+    Technique for Translucent Materials", 2002), in the steps of Cycles' bisection, with the slopes of the dipole."""
     inverse = dr.rcp(dr.detach(index))  # the index is held
     fresnel = inverse * (-1.440 * inverse + 0.710) + 0.668 + 0.0636 * dr.detach(index)
     boundary = (4 / 3) * (1 + fresnel) / (1 - fresnel)
-    wanted = dr.minimum(colour, 0.995)
-    sought = dr.detach(wanted)
+    sought = dr.detach(colour)
     low, high = 0 * sought, 0 * sought + 1
-    for _ in range(12):
+    middle = low
+    for _ in range(BISECTIONS):
         middle = 0.5 * (low + high)
         below = _dipole(middle, boundary)[0] < sought
         low, high = dr.select(below, middle, low), dr.select(below, high, middle)
-    middle = 0.5 * (low + high)
-    value, slope = _dipole(middle, boundary)
-    return saturate((wanted - value) / slope + middle)
+    middle = dr.select(sought < DARKEST_SKIN, 0, dr.select(sought < BRIGHTEST_SKIN, middle, MOST_ALBEDO))
+    return saturate((colour - sought) / _dipole(middle, boundary)[1] + middle)
 
 
 def _dipole(albedo: Any, boundary: Any) -> tuple[Any, Any]:

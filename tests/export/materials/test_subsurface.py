@@ -57,6 +57,15 @@ def test_a_ball_of_wax(scene: Any, export: Any, render_cycles: Any, method: str,
     same_level(export, render_cycles, ball(material))
 
 
+@pytest.mark.parametrize("colour", [(0.93, 0.97, 1.0), (0.7, 0.85, 0.99)])
+def test_bright_skin(scene: Any, export: Any, render_cycles: Any, colour: tuple[float, float, float]) -> None:
+    """Walks below it are as long as Cycles makes them; with those of the dipole itself half of the light was lost."""
+    lit(scene)
+    material = new_material("Skin", **{**VALUES, "Base_Color": colour})
+    principled(material).subsurface_method = "RANDOM_WALK_SKIN"
+    same_level(export, render_cycles, ball(material))
+
+
 @pytest.mark.parametrize("scale", [0.8, 4.0])
 @pytest.mark.parametrize("shape", [ball, monkey])
 def test_the_profile_of_christensen_and_burley(
