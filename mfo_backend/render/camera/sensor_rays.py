@@ -16,8 +16,8 @@ import mitsuba as mi
 
 
 def film_samples(sensor: mi.Sensor, sampler: mi.Sampler) -> tuple[mi.Ray3f, mi.Point2f]:
-    """A ray for each sample of each pixel, and where on the film it counts: at random in its pixel, under a box filter
-    at its corner. Those of a pixel follow each other; random numbers as in `ADIntegrator.sample_rays`."""
+    """A ray for each sample of each pixel, and where on the film it counts: at random in its pixel, or in what a
+    narrower filter has of it, under a box filter at its corner. Those of a pixel follow each other; random numbers as in `ADIntegrator.sample_rays`."""
     film = sensor.film()
     rfilter = film.rfilter()
     border = rfilter.border_size() if film.sample_border() else 0
@@ -29,6 +29,9 @@ def film_samples(sensor: mi.Sensor, sampler: mi.Sampler) -> tuple[mi.Ray3f, mi.P
     first = dr.opaque(mi.Point2f, tuple(int(n) - border for n in film.crop_offset()))
     corner = mi.Point2f(mi.Float(pixel - y * columns), mi.Float(y)) + first
     place = corner + sampler.next_2d()
+    if not rfilter.is_box_filter() and rfilter.radius() < 0.5:
+        # elsewhere in the pixel it would weigh nothing: one of Cycles' least width, 0.01, has 0.05 % of a pixel
+        place = corner + 0.5 + (place - corner - 0.5) * dr.opaque(mi.Float, 2.0 * rfilter.radius())
     # a sensor counts from 0 to 1 along the part of its film that is rendered
     on_film = (place - first - border) / dr.opaque(mi.Point2f, tuple(int(n) for n in film.crop_size()))
     on_lens = mi.Point2f(sampler.next_2d()) if sensor.needs_aperture_sample() else mi.Point2f(0.5)
