@@ -12,6 +12,7 @@ SCATTERED = {"Is Diffuse Ray": 1.0, "Is Reflection Ray": 1.0, "Ray Depth": 1.0, 
 CAMERA = {"Is Camera Ray": 1.0}
 # outputs that tell the camera's rays from all others, and nothing else
 OF_CAMERA = ("Is Camera Ray",)
+OF_SHADOW = ("Is Shadow Ray",)  # the same of rays that ask a surface for nothing but how much light it lets through
 
 
 def light_path_outputs(tree: bpy.types.NodeTree) -> set[str]:

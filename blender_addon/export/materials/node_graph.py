@@ -20,7 +20,7 @@ from ..camera.camera_model import Region, edges_of
 from ..findings import ExportError, Findings
 from ..fitted_slot import FittedSlot
 from ..material_model import Material, Socket
-from ..nodes.dependence import tells_sides
+from ..nodes.dependence import asked_of_side
 from ..nodes.target_shader import chosen_leaf, fitted_leaves, leaf_name, target_shader
 from ..steps import Pause, Steps
 from .read_material import read_target
@@ -224,7 +224,7 @@ def _far_side_is_known(material: bpy.types.Material | None) -> bool:
     1.7 % too dark beside a mirror, a block at 16 deviations, and is 0.00 % and at 2.8.
     """
     tree = None if material is None else node_tree_of(material)
-    return tree is not None and not tells_sides(tree)
+    return tree is not None and not asked_of_side(tree)
 
 
 def _perhaps_glowing(material: Material) -> Material:

@@ -9,12 +9,14 @@ from dataclasses import replace
 import bpy
 import numpy as np
 
+from ...probe.light_path import OF_CAMERA, OF_SHADOW, light_path_outputs
 from ...versions import PRINCIPLED, cycles_settings, node_tree_of
 from ..audit.rules import name_settings
 from ..audit.shading_table import MATERIAL, MATERIAL_CYCLES
 from ..findings import Findings, Fix
 from ..material_model import Material, Socket
 from ..nodes.closure_leaves import OUTPUT, UNKNOWN, ClosureLeaf
+from ..nodes.dependence import OF_SIDE, asked_for, asked_of_side
 from ..nodes.displacement import SHADING_NORMAL, bends_normals, displacement_of
 from ..nodes.graph_findings import (
     graph_problem,
@@ -83,9 +85,31 @@ def read_target(
     displacement = displacement_of(material)
     if displacement is not None:
         _read_displacement(material, displacement, found, findings)
+    _note_rays(material, found.passes_light, findings)
     inside = volume_sockets(material, found, findings) if found.passes_light else {}
     held = {name: replace(socket, linked=True) for name, socket in inside.items() if name not in target.places}
     return replace(found, sockets=found.sockets | inside | held)
+
+
+def _note_rays(material: bpy.types.Material, passes_light: bool, findings: Findings) -> None:
+    """Name nodes that answer rays which are not the camera's in another way than the fit has them."""
+    tree = node_tree_of(material)
+    if tree is None:
+        return
+    if passes_light:
+        asked = asked_of_side(tree)
+        if asked:
+            findings.note(
+                f"Material '{material.name}' lets light through, and {', '.join(asked)} tell its sides or rays apart: "
+                "its shadow and its inside are not as in Cycles."
+            )
+        return
+    paths = sorted(light_path_outputs(tree).difference(OF_CAMERA, OF_SHADOW))
+    if paths:
+        asked = ", ".join(paths)
+        findings.note(f"Material '{material.name}' asks Light Path for {asked}: bounces have it as diffuse rays do.")
+    if asked_for(tree, OF_SIDE):
+        findings.note(f"Material '{material.name}' asks for Backfacing: bounces have one answer for both sides.")
 
 
 def _read_displacement(

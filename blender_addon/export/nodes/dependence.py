@@ -75,12 +75,16 @@ def asked_of_instancer(tree: bpy.types.NodeTree) -> list[str]:
     return sorted({node.bl_label for node in _nodes(tree) if _asks_instancer(node)})
 
 
-def tells_sides(tree: bpy.types.NodeTree) -> bool:
-    """Whether nodes answer a ray that meets the back of a surface with other values than one that meets its front."""
+def asked_of_side(tree: bpy.types.NodeTree) -> list[str]:
+    """Labels of nodes that answer a ray that meets the back of a surface with other values than one at its front."""
     kinds = ("ShaderNodeLightPath", *OF_SURROUNDINGS)
-    return bool(asked_for(tree, OF_FACING)) or any(
-        node.bl_idname in kinds or getattr(node, "projection", "") == "BOX" for node in _nodes(tree)
-    )
+    others = {
+        node.bl_label
+        for node in _nodes(tree)
+        if (node.bl_idname in kinds and any(output.is_linked for output in node.outputs))
+        or getattr(node, "projection", "") == "BOX"
+    }
+    return sorted({*asked_for(tree, OF_FACING), *others})
 
 
 def turns_with_camera(tree: bpy.types.NodeTree) -> list[str]:
