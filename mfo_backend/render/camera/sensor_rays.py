@@ -16,8 +16,11 @@ import mitsuba as mi
 
 
 def film_samples(sensor: mi.Sensor, sampler: mi.Sampler) -> tuple[mi.Ray3f, mi.Point2f]:
-    """A ray for each sample of each pixel, and where on the film it counts: at random in its pixel, or in what a
-    narrower filter has of it, under a box filter at its corner. Those of a pixel follow each other; random numbers as in `ADIntegrator.sample_rays`."""
+    """A ray for each sample of each pixel, and where on the film it counts.
+
+    That is at random in its pixel, or in what a narrower filter has of it, under a box filter at its corner. Those of a
+    pixel follow each other; random numbers as in `ADIntegrator.sample_rays`.
+    """
     film = sensor.film()
     rfilter = film.rfilter()
     border = rfilter.border_size() if film.sample_border() else 0
