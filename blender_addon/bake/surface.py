@@ -21,10 +21,10 @@ from ..export.nodes.dependence import OF_SIDE, OF_SURROUNDINGS, OF_VIEW, asked_f
 from ..export.nodes.displacement import bends_normals, unbent
 from ..export.nodes.graph_findings import is_of_normal_map
 from ..export.nodes.leaf_kinds import EMISSION, distribution_of, is_shader, kind_of, only_nearest, walks_of
+from ..export.nodes.read_alphas import keep_alphas
 from ..probe.closure_tree import ClosureTree, Leaf, Value, own_groups
 from ..probe.light_path import SCATTERED, answer_light_paths, answer_random, light_path_outputs
 from ..versions import active_output
-from .read_alphas import keep_alphas
 from .stage import Stage, bake, staged
 from .unwrap import unwrapped
 

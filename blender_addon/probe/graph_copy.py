@@ -7,6 +7,7 @@ from collections.abc import Iterator, Sequence
 
 import bpy
 
+from ..export.nodes.read_alphas import keep_alphas
 from ..export.nodes.shader_graph import NOT_IN_CYCLES
 
 GROUP = "ShaderNodeGroup"
@@ -20,6 +21,7 @@ def own_copy(material: bpy.types.Material) -> bpy.types.Material:
     copy = material.copy()
     copy.animation_data_clear()
     _own(copy.node_tree)
+    keep_alphas((copy.node_tree, *_groups_in(copy.node_tree)))  # as long as its surface reads them
     return copy
 
 

@@ -17,6 +17,7 @@ from ..images.color_space import to_rec709
 from ..images.image_filter import filtered_pixels
 from ..images.image_pixels import UnreadableImageError
 from ..material_model import Socket, Texture
+from .merged_nodes import is_alpha_read
 
 MOST_NODES = 32  # between a picture and a socket, on all ways; Cycles evaluates what is larger
 LUMINANCE = np.array([0.2126, 0.7152, 0.0722], dtype=np.float32)
@@ -251,17 +252,12 @@ def _image(node: bpy.types.Node, output: str, *, bends: bool) -> Texture:
             f"the node '{node.name}' with extension Extend and {node.interpolation} interpolation"
         )
     try:
-        alpha_read = _is_read(node.outputs["Alpha"])
+        alpha_read = is_alpha_read(node, source_of)
         pixels = filtered_pixels(node.image, node.interpolation, wrap, alpha_read=alpha_read, bends=bends)
     except UnreadableImageError as problem:
         raise UnsupportedNodeError(f"the image '{node.image.name}' that {problem}") from None
     chosen = pixels[:, :, 3:4] if output == "Alpha" else pixels[:, :, :3]
     return Texture(chosen, _uv_matrix(node), wrap, FILTERS[node.interpolation])
-
-
-def _is_read(output: bpy.types.NodeSocket) -> bool:
-    """Whether Cycles reads an output: a link to it that is not muted."""
-    return any(not link.is_muted for link in output.links)
 
 
 def has_texture_mapping(node: bpy.types.Node) -> bool:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Colours of pictures whose Alpha is read too: Cycles divides them by it, in a bake of the colours alone as well."""
+"""Colours of pictures whose Alpha is read, too: Cycles divides them by it, and a copy that asks for one has both."""
 
 from __future__ import annotations
 
@@ -7,7 +7,9 @@ from collections.abc import Iterable
 
 import bpy
 
-from ..versions import active_output
+from ...versions import active_output
+from .merged_nodes import IMAGE, are_alike
+from .shader_graph import source_of
 
 # Of alpha, added to the colour: nothing, and yet no zero, with which Cycles would leave Alpha out
 TRACE = 1e-30
@@ -37,10 +39,12 @@ def _divided(
     """Color and Alpha of each Image Texture that is read by both, and where its Color goes."""
     links = list(tree.links)  # which are no more once a new one takes the place of any
     shown, found = _reaching(tree, links), []
+    read = [node for node in tree.nodes if node.bl_idname == IMAGE and node.outputs["Alpha"].is_linked]
     for node in tree.nodes:
-        if node.bl_idname == "ShaderNodeTexImage":
+        if node.bl_idname == IMAGE:
             color, alpha = node.outputs["Color"], node.outputs["Alpha"]
-            if any(link.from_socket == alpha and link.to_node.as_pointer() in shown for link in links):
+            like = {alpha, *(each.outputs["Alpha"] for each in read if are_alike(node, each, source_of))}
+            if any(link.from_socket in like and link.to_node.as_pointer() in shown for link in links):
                 found.append((color, alpha, [link.to_socket for link in links if link.from_socket == color]))
     return found
 
