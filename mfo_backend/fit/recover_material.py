@@ -23,9 +23,10 @@ from ..types.status import Status
 from .candidates import NOTHING_ELSE, Candidates
 from .judge.fit_task import FitTask, check_task
 from .judge.judged_result import judged_result
+from .judge.mirror_end import smoothest
 from .judge.model_gap import with_gap
 from .judge.picture_errors import picture_errors
-from .judge.verification import VerifiedEnd, Verifier
+from .judge.verification import Verification, VerifiedEnd, Verifier
 from .paper.fit import PaperRoute
 from .pictures.each_picture import SheetJudge
 from .plans import RecordedPlan
@@ -182,6 +183,8 @@ def _fit_along(
     status, pictures = _verified(route.verification, start, found)
     choice = found.choose([picture.image for picture in pictures])
     best = choice.end + 1 if choice.beats_start else 0
+    if best and status is not Status.CANCELLED:
+        found, pictures = _smoothed(found, pictures, best, renderer, route.verification)
     if pictures is not found.unverified:
         pictures = [*pictures[:best], route.verification.finished(pictures[best]), *pictures[best + 1 :]]
         task.listener(Preview(pictures[best].image))
@@ -212,6 +215,21 @@ def _verified(verification: Verifier, start: Callable[[], Any], found: RouteEnds
         return found.status, verification.pictures(start, [end.x for end in found.ends])
     except Interrupted:
         return Status.CANCELLED, found.unverified
+
+
+def _smoothed(
+    found: RouteEnds, pictures: Sequence[Candidate], best: int, renderer: Renderer, verification: Verifier
+) -> tuple[RouteEnds, Sequence[Candidate]]:
+    """Ends and pictures, the chosen one as a mirror where the reference does not speak against that."""
+    picture = pictures[best]
+    if not (isinstance(picture, VerifiedEnd) and isinstance(verification, Verification)):
+        return found, pictures
+    try:
+        end, picture = smoothest(found.ends[best - 1], picture, renderer.table, verification)
+    except Interrupted:
+        return found, pictures
+    ends = (*found.ends[: best - 1], end, *found.ends[best:])
+    return replace(found, ends=ends), [*pictures[:best], picture, *pictures[best + 1 :]]
 
 
 def _halves(task: FitTask, end: Candidate) -> tuple[Pixels, Pixels] | None:

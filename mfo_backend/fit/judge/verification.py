@@ -186,6 +186,24 @@ class Verification:
         self._add([picture], self._shown)
         return picture.end()
 
+    def like(self, end: VerifiedEnd, vector: Vector) -> VerifiedEnd:
+        """A picture of another vector that may be compared with that of an end: the same random numbers and samples."""
+        begun = self._halves_later(vector, (self._looked_at,), 0, self._begun)()
+        whole = not len(self._around)
+        picture = GrowingPicture(vector, [half.copy() for half in end.halves], self._begun, whole).put(begun)
+        self._add([picture], end.samples)
+        return picture.end()
+
+    def farther(self, end: VerifiedEnd, other: VerifiedEnd) -> tuple[float, float]:
+        """How much farther from the reference the `other` is, by squared differences of display values, and the
+        standard error of that; noise of the pictures has no part in the mean."""
+        first, second = (
+            np.prod([self._displayed(Image(half, Encoding.LINEAR)) - self._reference for half in each.halves], axis=0)
+            for each in (end, other)
+        )
+        more = (second - first).reshape(len(first), -1).mean(axis=1)
+        return float(more.mean()), float(more.std() / np.sqrt(len(more)))
+
     def glance(self, vector: Vector, *, elsewhere: Pixels) -> Pixels:
         """A quick picture of a vector over another one `elsewhere`, scene-linear (height, width, 3).
 

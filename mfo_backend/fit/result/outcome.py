@@ -128,13 +128,14 @@ def kept_note(names: Iterable[str], table: ParameterTable) -> str:
 def result_at(renderer: Renderer, vector: Vector, status: Status, message: str, seconds: float) -> FitResult:
     """The result with these values, of which nothing else is known."""
     table = renderer.table
+    lower = np.minimum(table.lower, vector)  # a mirror is below the least roughness of a lobe
     return FitResult(
         status=status,
         message=message,
         model=renderer.model,
         initial=table.unpack(renderer.start),
         recovered=table.unpack(vector),
-        bounds={p.name: (p.lower, p.upper) for p in table},
+        bounds={p.name: (float(lower[table.slice_of(p.name)].min()), p.upper) for p in table},
         stages=(),
         errors={},
         seconds=seconds,

@@ -17,6 +17,7 @@ from mfo_backend.fit.judge.verification import (
     SHOWN_SAMPLES,
     Verification,
 )
+from mfo_backend.metrics.display.colour import srgb_from_linear
 from mfo_backend.metrics.display.tone_mapping import DisplayView
 from mfo_backend.render.camera.widened_mask import widened
 from mfo_backend.render.pictures.pass_counter import PassCounter
@@ -272,3 +273,19 @@ def test_no_piece_of_a_whole_frame_repeats_the_numbers_of_further_samples():
     seeds = [piece.seed for seed, spp, count in taken for piece in pieces_of(np.arange(count), seed, spp)]
     assert len(seeds) > len(taken)  # there are pieces
     assert len(set(seeds)) == len(seeds)
+
+
+def test_a_further_picture_is_compared_under_the_same_numbers():
+    """Of 0.4 the pictures of 0.4 and 0.42: farther by the square of their difference, of which noise has no part."""
+    renderer = Renderer()
+    check = verification(renderer, 0.4)
+    end = check.pictures(check.begin(np.array([0.8])), [np.array([0.4])])[1]
+    same = check.like(end, np.array([0.4]))
+    assert all(np.array_equal(a, b) for a, b in zip(end.halves, same.halves, strict=True))
+    assert check.farther(end, same) == (0.0, 0.0)
+    other = check.like(end, np.array([0.5]))
+    assert other.samples == end.samples
+    more, error = check.farther(end, other)
+    wanted = np.square(srgb_from_linear(np.float32(0.5)) - srgb_from_linear(np.float32(0.4)))
+    assert error < 0.2 * wanted
+    assert more == pytest.approx(wanted, abs=3.0 * error)
