@@ -183,7 +183,7 @@ def _fit_along(
     status, pictures = _verified(route.verification, start, found)
     choice = found.choose([picture.image for picture in pictures])
     best = choice.end + 1 if choice.beats_start else 0
-    if best and status is not Status.CANCELLED:
+    if judged and best and status is not Status.CANCELLED:
         found, pictures = _smoothed(found, pictures, best, renderer, route.verification)
     if pictures is not found.unverified:
         pictures = [*pictures[:best], route.verification.finished(pictures[best]), *pictures[best + 1 :]]

@@ -24,19 +24,22 @@ ASKED = 0.1
 
 
 def as_mirror(end: End, table: ParameterTable) -> End | None:
-    """The same end without roughness; None where that is not small, not fitted, or limited by the user.
+    """The same end without roughness; None where that is not small, was kept, or is limited by the user.
 
-    Both look alike where this one is taken, so that the other's roughness is its standard deviation.
+    Both look alike where this one is taken, so that the other's roughness is its standard deviation at least.
     """
     if ROUGHNESS not in table.names or table[ROUGHNESS].lower != BLENDER_PRINCIPLED[ROUGHNESS].lower:
         return None
-    at = float(end.x[table.slice_of(ROUGHNESS)][0])
-    if at > ASKED:
+    at, known = float(end.x[table.slice_of(ROUGHNESS)][0]), end.certainty.get(ROUGHNESS)
+    if at > ASKED or known is None or known.level is Level.NOT_VISIBLE:
         return None
-    certainty = dict(end.certainty)
-    if ROUGHNESS in certainty:
-        certainty[ROUGHNESS] = replace(certainty[ROUGHNESS], sd=(at,), level=Level.WEAK)
-    return replace(end, x=table.with_values(end.x, **{ROUGHNESS: 0.0}), certainty=certainty)
+    level = Level.WEAK if known.level is Level.DETERMINED else known.level
+    less_sure = replace(known, sd=(max(at, *known.sd),), level=level)
+    return replace(
+        end,
+        x=table.with_values(end.x, **{ROUGHNESS: 0.0}),
+        certainty={**end.certainty, ROUGHNESS: less_sure},
+    )
 
 
 def smoothest(

@@ -33,11 +33,21 @@ def test_a_mirror_is_asked_for_where_an_end_is_nearly_one(roughness, is_asked):
         assert mirror.certainty["metallic"] == end(roughness).certainty["metallic"]
 
 
+def test_what_is_less_sure_stays_so():
+    mirror = as_mirror(end(0.05, 0.3, Level.NOT_TOLD_APART), TABLE)
+    assert mirror is not None
+    assert mirror.certainty["roughness"] == Certainty((0.3,), Level.NOT_TOLD_APART, ("metallic",))
+
+
+def test_a_value_that_was_kept_stays():
+    assert as_mirror(end(0.05, 0.3, Level.NOT_VISIBLE), TABLE) is None
+
+
 def test_a_limit_of_the_users_holds():
     limited = ParameterTable(
         Parameter("roughness", 1, 0.1, 1.0, 0.5) if name == "roughness" else BLENDER_PRINCIPLED[name] for name in NAMES
     )
-    at = limited.with_values(limited.lower, roughness=0.1)
-    assert as_mirror(End("refine", at), limited) is None
+    at, known = limited.with_values(limited.lower, roughness=0.1), end(0.05).certainty
+    assert as_mirror(End("refine", at, known), limited) is None
     held = ParameterTable([BLENDER_PRINCIPLED["metallic"]])
-    assert as_mirror(End("refine", np.zeros(1)), held) is None
+    assert as_mirror(End("refine", np.zeros(1), known), held) is None
