@@ -17,7 +17,8 @@ from .view_paint import Display, Paint
 NAME = "Material Fit Overlay"  # of the image, by which the background is known again
 LONGEST_SIDE = 2048  # pixels: no view shows more, and a line that is dragged paints all of them anew
 
-_picture: Display | None = None  # what lies over the view, before split or difference
+# the image that lies over a view, by its number in the session, and the picture that is painted into it
+_shown: tuple[int, Display] | None = None
 
 
 def is_shown(camera: bpy.types.Object | None) -> bool:
@@ -36,21 +37,22 @@ def show(scene: bpy.types.Scene) -> None:
     RuntimeError
         If its file cannot be read, or not in that way.
     """
-    global _picture
+    global _shown
     settings = scene.mfo
     hide(scene.camera)
-    _picture, image = None, _loaded(settings)
+    image = _loaded(settings)
     try:
-        _picture = _in_frame(image, scene)
+        picture = _in_frame(image, scene)
     except UnreadableImageError as problem:
         if settings.overlay.mode != "BLEND":
             bpy.data.images.remove(image)
             raise RuntimeError(f"it {problem}") from None
     else:
         bpy.data.images.remove(image)
-        height, width = _picture.shape[:2]
+        height, width = picture.shape[:2]
         image = bpy.data.images.new(NAME, width, height, alpha=True)
-        image.pixels.foreach_set(_painted(settings.overlay).ravel())
+        _shown = image.session_uid, picture
+        image.pixels.foreach_set(_painted(picture, settings.overlay).ravel())
         image.pack()  # a drawn image whose pixels no file holds is lost with the next undo step
     image.name = NAME
     camera = scene.camera.data
@@ -83,9 +85,9 @@ def repaint(scene: bpy.types.Scene) -> bool:
     An undo brings the settings back, and not always the pixels.
     """
     background = _background(scene.camera)
-    if background is None or _picture is None or tuple(background.image.size) != _picture.shape[1::-1]:
+    if background is None or _shown is None or background.image.session_uid != _shown[0]:
         return False
-    background.image.pixels.foreach_set(_painted(scene.mfo.overlay).ravel())
+    background.image.pixels.foreach_set(_painted(_shown[1], scene.mfo.overlay).ravel())
     background.image.update()
     return True
 
@@ -99,8 +101,8 @@ def keep() -> None:
 
 def forget() -> None:
     """Free the pixels kept for `change`."""
-    global _picture
-    _picture = None
+    global _shown
+    _shown = None
 
 
 def _loaded(settings: bpy.types.PropertyGroup) -> bpy.types.Image:
@@ -121,15 +123,16 @@ def _in_frame(image: bpy.types.Image, scene: bpy.types.Scene) -> Display:
     width, height = picture_size(scene.render)
     pixels = np.zeros((height, width, 4), np.float32)
     inside = pixels[height - region.bottom : height - region.top, region.left : region.right]  # rows from below
-    inside[:] = as_viewed(image, scene)
+    if inside.size and tuple(image.size) != region.size:
+        image.scale(*region.size)
+    inside[:] = as_viewed(image, scene) if inside.size else 0.0
     return pixels
 
 
-def _painted(over: bpy.types.PropertyGroup) -> Paint:
-    assert _picture is not None
+def _painted(picture: Display, over: bpy.types.PropertyGroup) -> Paint:
     if over.mode == "SPLIT":
-        return view_paint.split(_picture, over.line)
-    return view_paint.difference(_picture) if over.mode == "DIFFERENCE" else view_paint.whole(_picture)
+        return view_paint.split(picture, over.line)
+    return view_paint.difference(picture) if over.mode == "DIFFERENCE" else view_paint.whole(picture)
 
 
 def _opacity(over: bpy.types.PropertyGroup) -> float:

@@ -110,6 +110,33 @@ def test_a_large_picture_has_no_more_pixels_than_a_view(scene: SimpleNamespace, 
     )
 
 
+def test_each_scene_has_its_own(shown: SimpleNamespace, tmp_path: Path) -> None:
+    bpy = shown.bpy
+    first = bpy.context.scene
+    second = first.copy()
+    second.camera = first.camera.copy()
+    second.camera.data = first.camera.data.copy()
+    second.camera.data.background_images.clear()
+    Image.new("RGB", (96, 64), (10, 200, 10)).save(tmp_path / "green.png")
+    second.mfo.reference_path = str(tmp_path / "green.png")
+    with bpy.context.temp_override(scene=second, view_layer=second.view_layers[0]):
+        assert bpy.ops.mfo.overlay_reference() == {"FINISHED"}
+    before = painted(shown)
+    first.mfo.overlay.mode = "SPLIT"
+    assert painted(shown)[:, :48] == pytest.approx(before[:, :48])
+
+
+def test_a_picture_of_another_size_fills_the_render_region(scene: SimpleNamespace, tmp_path: Path) -> None:
+    render = scene.bpy.context.scene.render
+    render.use_border = render.use_crop_to_border = True
+    render.border_min_x, render.border_max_x, render.border_min_y, render.border_max_y = 0.25, 0.75, 0.0, 0.5
+    Image.new("RGB", (30, 20), (10, 200, 10)).save(tmp_path / "small.png")
+    scene.bpy.context.scene.mfo.reference_path = str(tmp_path / "small.png")
+    assert scene.bpy.ops.mfo.overlay_reference() == {"FINISHED"}
+    rows, columns = np.nonzero(painted(scene)[..., 3])
+    assert (rows.min(), rows.max(), columns.min(), columns.max()) == (32, 63, 24, 71)
+
+
 RAMP = np.linspace(0.0, 3.0, 96, dtype=np.float32)[None, :, None] * np.array([1.0, 0.6, 0.3], np.float32)
 
 
