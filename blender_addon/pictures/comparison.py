@@ -7,14 +7,14 @@ from pathlib import Path
 
 import bpy
 import numpy as np
-from numpy.typing import NDArray
+
+from .view_paint import Display
 
 NAMES = ("reference", "result", "difference")
 COMPARISON = "Material Fit comparison"
 SPLIT = "Material Fit split"
 PICTURE_GAP = 8  # pixels between two pictures
 
-Display = NDArray[np.float32]  # display values (height, width, 4), bottom row first as Blender keeps them
 _halves: tuple[Display, Display] | None = None
 
 

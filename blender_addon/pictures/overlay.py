@@ -3,6 +3,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import bpy
@@ -17,8 +19,21 @@ from .view_paint import Display, Paint
 NAME = "Material Fit Overlay"  # of the image, by which the background is known again
 LONGEST_SIDE = 2048  # pixels: no view shows more, and a line that is dragged paints all of them anew
 
-# the image that lies over a view, by its number in the session, and the picture that is painted into it
-_shown: tuple[int, Display] | None = None
+
+@dataclass(frozen=True)
+class _Shown:
+    """The image that lies over a view, by its number in the session, its picture, and the paint made of that by `way`.
+
+    Paint of a large picture takes half a second: a line that is dragged, and an undo, take it as it is.
+    """
+
+    image: int
+    picture: Display
+    way: Callable[[Display], Paint]
+    paint: Paint
+
+
+_shown: _Shown | None = None
 
 
 def is_shown(camera: bpy.types.Object | None) -> bool:
@@ -51,8 +66,8 @@ def show(scene: bpy.types.Scene) -> None:
         bpy.data.images.remove(image)
         height, width = picture.shape[:2]
         image = bpy.data.images.new(NAME, width, height, alpha=True)
-        _shown = image.session_uid, picture
-        image.pixels.foreach_set(_painted(picture, settings.overlay).ravel())
+        _shown = _Shown(image.session_uid, picture, view_paint.whole, view_paint.whole(picture))
+        image.pixels.foreach_set(_painted(_shown, settings.overlay).ravel())
         image.pack()  # a drawn image whose pixels no file holds is lost with the next undo step
     image.name = NAME
     camera = scene.camera.data
@@ -85,9 +100,9 @@ def repaint(scene: bpy.types.Scene) -> bool:
     An undo brings the settings back, and not always the pixels.
     """
     background = _background(scene.camera)
-    if background is None or _shown is None or background.image.session_uid != _shown[0]:
+    if background is None or _shown is None or background.image.session_uid != _shown.image:
         return False
-    background.image.pixels.foreach_set(_painted(_shown[1], scene.mfo.overlay).ravel())
+    background.image.pixels.foreach_set(_painted(_shown, scene.mfo.overlay).ravel())
     background.image.update()
     return True
 
@@ -123,16 +138,19 @@ def _in_frame(image: bpy.types.Image, scene: bpy.types.Scene) -> Display:
     width, height = picture_size(scene.render)
     pixels = np.zeros((height, width, 4), np.float32)
     inside = pixels[height - region.bottom : height - region.top, region.left : region.right]  # rows from below
-    if inside.size and tuple(image.size) != region.size:
-        image.scale(*region.size)
-    inside[:] = as_viewed(image, scene) if inside.size else 0.0
+    if inside.size:  # a region may have none
+        if tuple(image.size) != region.size:
+            image.scale(*region.size)
+        inside[:] = as_viewed(image, scene)
     return pixels
 
 
-def _painted(picture: Display, over: bpy.types.PropertyGroup) -> Paint:
-    if over.mode == "SPLIT":
-        return view_paint.split(picture, over.line)
-    return view_paint.difference(picture) if over.mode == "DIFFERENCE" else view_paint.whole(picture)
+def _painted(shown: _Shown, over: bpy.types.PropertyGroup) -> Paint:
+    global _shown
+    way = view_paint.difference if over.mode == "DIFFERENCE" else view_paint.whole
+    if shown.way is not way:
+        _shown = shown = replace(shown, way=way, paint=way(shown.picture))
+    return view_paint.split(shown.paint, over.line) if over.mode == "SPLIT" else shown.paint
 
 
 def _opacity(over: bpy.types.PropertyGroup) -> float:
@@ -140,11 +158,13 @@ def _opacity(over: bpy.types.PropertyGroup) -> float:
 
 
 def hide(camera: bpy.types.Object | None) -> None:
-    """Take it away, with its image."""
+    """Take it away, with its image and the pixels kept for it."""
     while camera is not None and (background := _background(camera)) is not None:
         image = background.image
         camera.data.background_images.remove(background)
         camera.data.update_tag()  # else the view goes on with a copy of the camera that shows the freed image
+        if _shown is not None and _shown.image == image.session_uid:
+            forget()
         bpy.data.images.remove(image)
 
 

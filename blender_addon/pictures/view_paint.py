@@ -27,11 +27,11 @@ def whole(picture: Display) -> Paint:
     return _painted(picture[..., :3] ** GAMMA, picture[..., 3:])
 
 
-def split(picture: Display, share: float) -> Paint:
-    """The picture in the left `share` of its width, and nothing in the rest, with a white line between them."""
-    painted, column = whole(picture), round(share * picture.shape[1])
+def split(paint: Paint, share: float) -> Paint:
+    """Paint in the left `share` of its width, and none in the rest, with a white line between them."""
+    painted, column = paint.copy(), round(share * paint.shape[1])
     painted[:, column:, 3] = 0.0
-    if 0 < column < picture.shape[1]:
+    if 0 < column < paint.shape[1]:
         painted[:, column] = 1.0
     return painted
 

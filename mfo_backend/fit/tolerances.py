@@ -90,6 +90,10 @@ ANOTHER_BASIN = 0.1
 # Of two solved ends, which lie as near to their minimum as a solve comes: further apart they are two materials.
 # Larger: a rival is taken for the result itself. Smaller: the result is named as its own rival. No measurement.
 ANOTHER_MATERIAL = 0.02
+# Largest roughness of an end that is asked by a picture whether it is a mirror. Chrome of roughness 0 ended at 0.052 to
+# 0.069 by Cycles' pictures of a ball and a head; pictures told 0.1 from none by two standard errors and more
+# (docs/notebook/recorded_paths.md). Larger: a picture more of materials that are none. Smaller: chrome keeps a blur.
+NEARLY_A_MIRROR = 0.1
 # A value this near to its lower bound is switched off. Larger: weak lobes count as none. No measurement.
 OFF = 0.002
 

@@ -72,6 +72,7 @@ def test_the_reference_against_the_view(windowed: RealBlender, tmp_path: Path) -
     out = windowed.run(*options, *script, windows=True).stdout
     assert "ALL GOOD over the view" in out, out[-4000:]
     assert "script error" not in out, out[-4000:]
+    print(*(line for line in out.splitlines() if "off by" in line), sep="\n")
 
 
 def test_two_pictures_and_two_materials_by_real_events(windowed: RealBlender, tmp_path: Path) -> None:

@@ -9,6 +9,7 @@ sum of the products' squares is the standard deviation of their sum.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator, Sequence
 
 import numpy as np
@@ -33,10 +34,7 @@ NEXT = ((0, 1), (1, 0), (1, 1), (1, -1))
 # Pixels: of what an eye is asked about, so that it does not look at noise. Nine tenths of independent noise go, and
 # little of what few global values change
 BLUR = 2.0
-# Pixels that share their noise after that, 4 pi BLUR^2: of independent ones a target has so many times fewer.
-# One of 111 pixels had noise of 0.146 and was called the same at 0.083 above the floor (docs/notebook/wild.md).
-# Larger: more small noisy targets are not called the same.
-BLURRED_TOGETHER = 50.0
+BLURRED_TOGETHER = 4.0 * math.pi * BLUR**2  # pixels that share their noise after that
 NOISE_REACH = 4  # pixels to each side of one that its noise is taken from
 LEAST_PIXELS = 40  # fewer say too little
 # Below as many, noise is drawn from the pictures themselves, with their tails and colours: normal numbers of the same

@@ -13,14 +13,10 @@ from ...material.principled.principled_parameters import BLENDER_PRINCIPLED
 from ...types.certainty import Level
 from ...types.parameter import ParameterTable
 from ..result.outcome import End
-from ..tolerances import CHANCE
+from ..tolerances import CHANCE, NEARLY_A_MIRROR
 from .verification import Verification, VerifiedEnd
 
 ROUGHNESS = "roughness"
-# Largest roughness of an end that is asked whether it is a mirror. Chrome of roughness 0 ended at 0.052 to 0.069 by
-# Cycles' pictures of a ball and a head; pictures told 0.1 from none by two standard errors and more
-# (docs/notebook/recorded_paths.md). Larger: a picture more of materials that are none. Smaller: chrome keeps a blur.
-ASKED = 0.1
 
 
 def as_mirror(end: End, table: ParameterTable) -> End | None:
@@ -31,7 +27,7 @@ def as_mirror(end: End, table: ParameterTable) -> End | None:
     if ROUGHNESS not in table.names or table[ROUGHNESS].lower != BLENDER_PRINCIPLED[ROUGHNESS].lower:
         return None
     at, known = float(end.x[table.slice_of(ROUGHNESS)][0]), end.certainty.get(ROUGHNESS)
-    if at > ASKED or known is None or known.level is Level.NOT_VISIBLE:
+    if at > NEARLY_A_MIRROR or known is None or known.level is Level.NOT_VISIBLE:
         return None
     level = Level.WEAK if known.level is Level.DETERMINED else known.level
     less_sure = replace(known, sd=(max(at, *known.sd),), level=level)

@@ -110,6 +110,26 @@ def test_a_large_picture_has_no_more_pixels_than_a_view(scene: SimpleNamespace, 
     )
 
 
+def test_a_line_is_dragged_without_new_paint(shown: SimpleNamespace, monkeypatch: pytest.MonkeyPatch) -> None:
+    from blender_addon.pictures import overlay, view_paint
+
+    made = []
+    for name in ("whole", "difference"):
+        way = getattr(view_paint, name)
+        monkeypatch.setattr(view_paint, name, lambda picture, n=name, way=way: made.append(n) or way(picture))
+    over = shown.bpy.context.scene.mfo.overlay
+    overlay.show(shown.bpy.context.scene)
+    over.mode = "SPLIT"
+    for over.line in (0.2, 0.4, 0.6):
+        overlay.repaint(shown.bpy.context.scene)  # as an undo does
+    assert made == ["whole"]
+    for over.mode in ("DIFFERENCE", "BLEND"):
+        overlay.repaint(shown.bpy.context.scene)
+    assert made == ["whole", "difference", "whole"]
+    overlay.hide(shown.bpy.context.scene.camera)
+    assert overlay._shown is None
+
+
 def test_each_scene_has_its_own(shown: SimpleNamespace, tmp_path: Path) -> None:
     bpy = shown.bpy
     first = bpy.context.scene

@@ -54,19 +54,19 @@ def test_only_the_channel_that_differs_leaves_the_grey() -> None:
 
 
 def test_nothing_is_painted_where_the_picture_has_nothing() -> None:
-    from blender_addon.pictures.view_paint import difference, split
+    from blender_addon.pictures.view_paint import difference, split, whole
 
     picture = PICTURE.copy()
     picture[:12, :, 3] = 0.0
     assert not difference(picture)[:12, :, 3].any()
-    assert not split(picture, 1.0)[:12, :, 3].any()
+    assert not split(whole(picture), 1.0)[:12, :, 3].any()
 
 
 @pytest.mark.parametrize("share", [0.0, 0.3, 1.0])
 def test_a_split_shows_the_picture_left_of_a_line(share: float) -> None:
-    from blender_addon.pictures.view_paint import split
+    from blender_addon.pictures.view_paint import split, whole
 
-    painted, column = split(PICTURE, share), round(40 * share)
+    painted, column = split(whole(PICTURE), share), round(40 * share)
     assert laid_over(painted, PICTURE[::-1, ..., :3])[:, :column] == pytest.approx(
         PICTURE[:, :column, :3], abs=0.025
     )  # black of 8 bits: a level of the paint
