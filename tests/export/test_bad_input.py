@@ -137,6 +137,16 @@ def other_without_colour(scene: Any, target: Any) -> None:
     add_quad("Wall", 0.2, -1.0, diffuse_material("Wall", (float("nan"), 1, 1)))
 
 
+def emitter_put_away(scene: Any, target: Any) -> None:
+    target.modifiers.new("Hair", "PARTICLE_SYSTEM")
+    target.show_instancer_for_render = False
+
+
+def instancer_put_away(scene: Any, target: Any) -> None:
+    target.instance_type = "VERTS"
+    target.show_instancer_for_render = False
+
+
 CAMERA = (
     "The place or a setting of the camera is NaN or infinite: mend the driver, constraint or keyframe that gives it."
 )
@@ -146,6 +156,10 @@ LAMP = (
 )
 HOLED = (
     "Image 'Holed' has pixels that are NaN, infinite or absurdly bright (1e15): replace them, or choose another image."
+)
+PUT_AWAY = (
+    "Object 'Target' shows others and not itself in the render: turn its Show Emitter (of particles) or Show Instancer "
+    "(Render) on."
 )
 WORLD = "The colour or strength of the world is NaN or infinite: mend the driver or keyframe that gives it."
 VALUE = "A value of material '{}' is NaN or infinite: mend the driver or keyframe that gives it, or set a number."
@@ -175,6 +189,8 @@ CASES: dict[Callable[[Any, Any], None], str] = {
     holed_sky: HOLED,
     no_roughness: VALUE.format("Target"),
     other_without_colour: VALUE.format("Wall"),
+    emitter_put_away: PUT_AWAY,
+    instancer_put_away: PUT_AWAY,
     no_faces: "No face of 'Target' uses its active material slot 1: choose another.",
 }
 

@@ -70,6 +70,11 @@ def say_no_faces(fitted: FittedSlot, view_layer: bpy.types.ViewLayer, left_out: 
     name = fitted.object.name
     if fitted.object.name_full not in rendered_objects(view_layer) | instanced_objects(view_layer):
         findings.error(f"Object '{name}' is hidden in the render: show it.", Fix("show_in_render"))
+    elif _is_put_away(fitted.object):
+        findings.error(
+            f"Object '{name}' shows others and not itself in the render: turn its Show Emitter (of particles) or Show "
+            "Instancer (Render) on."
+        )
     elif left_out:
         findings.error(
             f"All faces of '{name}' with its active material have corners at NaN, infinite or absurdly "
@@ -79,6 +84,11 @@ def say_no_faces(fitted: FittedSlot, view_layer: bpy.types.ViewLayer, left_out: 
         findings.error(f"No face of '{name}' uses its active material slot {fitted.slot + 1}: choose another.")
     else:
         findings.error(f"No face of '{name}' uses its material slot {fitted.slot + 1}: choose another.")
+
+
+def _is_put_away(item: bpy.types.Object) -> bool:
+    """Whether an instancer, or an emitter of particles, is not rendered itself."""
+    return not item.show_instancer_for_render and (bool(item.particle_systems) or item.instance_type != "NONE")
 
 
 def _whole_frame(camera: Camera) -> list[Fix]:
