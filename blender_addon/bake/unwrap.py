@@ -38,7 +38,7 @@ def unwrapped(mesh: bpy.types.Mesh, slots: NDArray[np.bool_], scene: bpy.types.S
             if chosen:
                 face.select_set(True)
         bmesh.update_edit_mesh(copy)
-        bpy.ops.uv.smart_project(angle_limit=ANGLE, island_margin=ISLAND_MARGIN)
+        bpy.ops.uv.smart_project(angle_limit=ANGLE, island_margin=ISLAND_MARGIN, correct_aspect=False)
         bpy.ops.object.mode_set(mode="OBJECT")
         uv = np.zeros(len(copy.loops) * 2, dtype=np.float32)
         copy.uv_layers.active.uv.foreach_get("vector", uv)

@@ -4,13 +4,18 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import Any
 
+import bpy
 import numpy as np
 import pytest
 
+from blender_addon.bake.unwrap import unwrapped
 from blender_addon.export.camera.camera_model import Camera
 from blender_addon.export.meshes.mesh_arrays import CornerMesh, Piece
 from blender_addon.export.scene.scene_bakes import LEAST_SIZE, MOST_SIZE, TEXELS_A_PIXEL, USED, _texels
+
+from ..scenes import add_quad, new_material
 
 ABOVE = np.array([[1.0, 0, 0, 0], [0, 1, 0, 0], [0, 0, 1, 5], [0, 0, 0, 1]])
 CAMERA = Camera(
@@ -50,3 +55,16 @@ def test_what_is_not_in_the_picture_or_has_no_area_is_coarse() -> None:
     camera = replace(CAMERA, width=1024, height=1024)
     assert _texels(camera, square(1.0, x=9.0)) == LEAST_SIZE
     assert _texels(camera, square(0.0)) == LEAST_SIZE
+
+
+@pytest.mark.parametrize("width", [64, 512], ids=["square", "wide"])
+def test_a_pictures_shape_does_not_stretch_the_map_of_a_bake(scene: Any, width: int) -> None:
+    """Smart UV Project took the shape of the picture of the active node: a square had one column of texels."""
+    material = new_material("Logo")
+    node = material.node_tree.nodes.new("ShaderNodeTexImage")
+    node.image = bpy.data.images.new("Logo", width, 64)
+    material.node_tree.nodes.active = node
+    uv = unwrapped(add_quad("Sign", 1.0, 0.0, material).data, np.ones(1, np.bool_), bpy.context.scene)
+    sides = np.ptp(uv, axis=0)
+    assert sides[0] == pytest.approx(sides[1], rel=1e-3)
+    assert sides.min() > 0.45
