@@ -4,7 +4,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, ClassVar
 
 from ..arrays import dual as dr
 from ..arrays.grid_table import cycles_table
@@ -19,6 +19,7 @@ class SheenLobe:
     albedo: Any
     cos_phi: Any
     sin_phi: Any
+    shaded_by_bumps: ClassVar[bool] = True
 
     def value(self, wo: Any) -> Any:
         """Normalised lobe times cosine at `wo`; integrates to 1 over the hemisphere."""
@@ -49,9 +50,10 @@ class VelvetLobe:
     wi: Any
     sigma: Any
     albedo: Any = 1.0
+    shaded_by_bumps: ClassVar[bool] = False  # Cycles counts it among glossy lobes, though its bounces are diffuse
 
     def value(self, wo: Any) -> Any:
-        """D G / (4 mu) at `wo` above the surface, the cosine included."""
+        """D G / (4 mu) at `wo`, the cosine included; none where it or the view is below a surface that nodes bend."""
         h = dr.normalize(self.wi + wo)
         cosine = dr.maximum(dr.dot(self.wi, h), 1e-5)
         sin2 = dr.maximum(dr.square(h.x) + dr.square(h.y), 1e-7)
@@ -59,7 +61,7 @@ class VelvetLobe:
         normals = dr.exp(-dr.square(h.z) / sin2 * inverse) * inverse / (dr.pi * dr.square(sin2))
         masking = dr.minimum(1, 2 * h.z / cosine * dr.minimum(self.wi.z, wo.z))
         value = normals * masking / (4 * dr.maximum(self.wi.z, 1e-7))
-        return dr.select((wo.z > 0) & (h.z < 1 - 1e-5), value, 0)
+        return dr.select((self.wi.z > 0) & (wo.z > 0) & (h.z < 1 - 1e-5), value, 0)
 
     def pdf(self, wo: Any) -> Any:
         """Density of `sample` per solid angle."""

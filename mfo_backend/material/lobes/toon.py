@@ -29,6 +29,11 @@ class ToonLobe:
     glossy: bool = False
     albedo: Any = 1.0
 
+    @property
+    def shaded_by_bumps(self) -> bool:
+        """Whether the terminator of bumps is for it, as for diffuse lobes in Cycles."""
+        return not self.glossy
+
     def value(self, wo: Any) -> Any:
         """f_r |cos| of a white lobe at `wo` above the surface."""
         angle, full, width = self._angle(wo), self._full, self._width

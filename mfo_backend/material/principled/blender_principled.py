@@ -55,7 +55,7 @@ def evaluate(layers: Layers, wo: Any, *, reachable_only: Any = False) -> Any:
         value += _coat(layers, wi, up, half)
     if layers.glass is not None:
         value += _glass_reflection(layers, up, half)
-    value += _diffuse(layers, wi, up)
+    value += _fibres(layers, up) + _diffuse(layers, wi, up)
     value = dr.select((wo.z > 0) & (wi.z > 0), value, 0)
     if layers.glass is not None and layers.glass_fresnel is not None:
         value += refracted(layers, wo, reachable_only=reachable_only)
@@ -81,8 +81,11 @@ def _evaluate_bumped(layers: Layers, normals: BumpedNormals, wo: Any, reachable_
         wi_coat, wo_coat = about(normals.coat, wi), about(normals.coat, wo)
         seen = normals.lit(normals.coat, wo) & (wi_coat.z > 0)
         value += dr.select(seen, _coat(layers, wi_coat, _above(wo_coat), _half(wi_coat, wo_coat)), 0)
-    diffuse = _diffuse(layers, about(normals.diffuse, wi), _above(about(normals.diffuse, wo)))
-    value += dr.select(normals.lit(normals.diffuse, wo), diffuse * normals.terminator(wo), 0)
+    above, shade = _above(about(normals.diffuse, wo)), normals.terminator(wo)
+    fibres, diffuse = _fibres(layers, above), _diffuse(layers, about(normals.diffuse, wi), above) * shade
+    if layers.sheen_shape is None or layers.sheen_shape.shaded_by_bumps:
+        fibres *= shade
+    value += dr.select(normals.lit(normals.diffuse, wo), fibres + diffuse, 0)
     if layers.glass is not None and layers.glass_fresnel is not None:
         value += refracted(layers, wo, reachable_only=reachable_only)
     if layers.translucent is not None:
@@ -127,11 +130,16 @@ def _glass_reflection(layers: Layers, wo: Any, half: Half) -> Any:
     return layers.glass * layers.glass_reflected * layers.glass_fresnel(c) * lobe
 
 
+def _fibres(layers: Layers, wo: Any) -> Any:
+    """Sheen, or what stands in its place: velvet or toon."""
+    if layers.sheen is None or layers.sheen_shape is None:
+        return 0
+    return layers.sheen * layers.sheen_shape.value(wo)
+
+
 def _diffuse(layers: Layers, wi: Any, wo: Any) -> Any:
-    """Sheen, diffuse and what stands for subsurface."""
+    """Diffuse and what stands for subsurface."""
     value: Any = 0
-    if layers.sheen is not None and layers.sheen_shape is not None:
-        value += layers.sheen * layers.sheen_shape.value(wo)
     if layers.diffuse is not None:
         if layers.diffuse_roughness is None:
             value += layers.diffuse * lambert(wo)

@@ -6,8 +6,11 @@ from __future__ import annotations
 import drjit as dr
 import mitsuba as mi
 import numpy as np
+import pytest
 
+from mfo_backend.material.cycles_model import cycles_model
 from mfo_backend.material.lobes.microfacet import smith_lambda
+from mfo_backend.material.lobes.sheen import VelvetLobe
 from mfo_backend.material.principled.blender_principled import BLENDER_5_0, blender_principled
 from mfo_backend.material.principled.bumped_normals import BumpedNormals, about, valid_normal
 from mfo_backend.material.principled.needed_lobes import ALL_LOBES
@@ -98,3 +101,28 @@ def test_each_lobe_looks_at_its_own_normal() -> None:
     found = np.array(blender_principled(matt | bump, view, light, ALL_LOBES, BLENDER_5_0))
     wanted = np.array(blender_principled(matt, turned_view, turned_light, ALL_LOBES, BLENDER_5_0))
     np.testing.assert_allclose(found, wanted, rtol=2e-3, atol=1e-5)
+
+
+@pytest.mark.parametrize("shader", ["toon", "toon_glossy", "velvet", "sheen"])
+def test_bumps_shade_diffuse_lobes_alone(shader: str) -> None:
+    """As Cycles sorts its closures: velvet and the glossy cone of a Toon BSDF are glossy ones."""
+    distribution = "ASHIKHMIN" if shader == "velvet" else "MULTI_GGX"
+    model = cycles_model((5, 0), distribution, shader if shader.startswith("toon") else "principled")
+    values = {"sheen_weight": 1.0, "base_color": 0.0, "specular_ior_level": 0.0, "toon_size": 0.8, "toon_smooth": 0.1}
+    tilted, up = mi.Vector3f(0.6, 0.0, 0.8), mi.Vector3f(*UP)
+    view, light = directions(7, least=0.9), directions(8, least=0.5)
+    bent = {"bumped_normal": up, "coat_normal": up}
+    plain, shaded = (
+        blender_principled({**values, **bent, "smooth_normal": smooth}, view, light, model=model)[0].numpy()
+        for smooth in (up, tilted)
+    )
+    seen = (plain > 1e-4) & (dr.dot(light, tilted).numpy() > 0.0)
+    share = BumpedNormals(tilted, up, up).terminator(light).numpy() if shader in ("toon", "sheen") else 1.0
+    assert seen.sum() > 500
+    np.testing.assert_allclose(shaded[seen], (plain * share)[seen], rtol=1e-4)
+
+
+def test_velvet_is_black_where_the_view_is_below_its_normal() -> None:
+    """A negative cosine gave numbers without end."""
+    lobe = VelvetLobe(mi.Vector3f(0.9, 0.0, -0.43), mi.Float(0.7))
+    assert not lobe.value(directions(9)).numpy().any()
