@@ -6,7 +6,7 @@ Each variant is a copy of the material's whole tree; Cycles merges what is the s
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence, Set
 from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 from ..graph_values.place import Place, write
 from .aov_render import Frame, world_to_frame
 from .closure_tree import ClosureTree
-from .depths import FAR_SIDE, at_depth, joined_depths, peeled, scale_of_far_side, with_far_side
+from .depths import FAR_SIDE, joined_depths, peeled, scale_of_far_side, with_far_side
 from .graph_copy import own_copy, remove_copy, variant_of
 from .other_views import ELSEWHERE_SCALE, asks_ray, cosines_of, see_from_elsewhere
 from .server import ProbeRequestError
@@ -179,7 +179,8 @@ class VariantPictures:
     ) -> tuple[_Found, dict[str, str]]:
         """What Cycles writes into the outputs of some variants, and the types of their sockets.
 
-        Directions that scatter are those of one sample: in a mean of several bumps as fine as a subpixel are flat.
+        Where directions scatter all is of one sample: in a mean of several bumps as fine as a subpixel are flat, and
+        colours and shares of shaders belong to the sample's own direction.
         """
         material = self.target.material
         of_each = [(k, i, name) for k, each in enumerate(variants) for i, name in enumerate(each.names)]
@@ -204,9 +205,10 @@ class VariantPictures:
             outputs = partial(self.target.outputs, copy, frame=frame, by_pixels=by_pixels)
             found = joined_depths(outputs(at_depths, samples=self.samples), wanted, depths)
             if turned and self.samples > 1:
-                asked = [(at_depth(name, depth), True) for name, _ in turned for depth in range(depths[-1] + 1)]
-                single = joined_depths(outputs(asked, samples=1), turned, depths)
-                found |= {name: _single(picture, found[name]) for name, picture in single.items()}
+                single = joined_depths(outputs(at_depths, samples=1), wanted, depths)
+                for k, each in enumerate(variants):
+                    names = [_name(k, i) for i in range(len(each.names))]
+                    found |= _of_one_sample(single, found, names, {name for name, _ in turned} & set(names))
         finally:
             remove_copy(copy)
             remove_copy(base)
@@ -214,11 +216,20 @@ class VariantPictures:
         return pictures | {key: found[key] for key in (MASK, POSITION)}, kinds
 
 
-def _single(one: Picture, mean: Picture) -> Picture:
-    """Directions of one sample each where they scatter: their mean is shorter than they are. Elsewhere that mean, also
-    where the one sample missed the target."""
-    own, common = (np.linalg.norm(each, axis=-1, keepdims=True) for each in (one, mean))
-    return np.where((own > SEEN) & (common < (1.0 - APART) * own), one, mean)
+def _of_one_sample(
+    one: Mapping[str, Picture], mean: Mapping[str, Picture], names: Sequence[str], directions: Set[str]
+) -> dict[str, Picture]:
+    """Pictures of a variant with those of `one` sample where its directions scatter: their mean is shorter than they
+    are. Elsewhere that mean, also where the one sample missed the target."""
+    found, covered = {}, one[MASK][..., :1] > SEEN
+    mask, scatters = mean[MASK][..., :1], np.zeros_like(covered)
+    for name in directions:
+        own, common = (np.linalg.norm(each[name], axis=-1, keepdims=True) for each in (one, mean))
+        found[name] = np.where((own > SEEN) & (common < (1.0 - APART) * own), one[name], mean[name])
+        scatters |= covered & (common < (1.0 - APART) * own * mask)
+    for name in set(names) - directions:
+        found[name] = np.where(scatters, one[name] / np.maximum(one[MASK][..., :1], SEEN) * mask, mean[name])
+    return found
 
 
 def _outputs_of(variants: Sequence[Variant]) -> int:

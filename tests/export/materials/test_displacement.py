@@ -255,6 +255,23 @@ def test_bumps_finer_than_a_subpixel_darken_as_in_cycles(
     assert abs(found.mean() / truth.mean() - 1.0) < 0.003
 
 
+@pytest.mark.parametrize("asked", ["Fresnel", "Facing", "Normal"])
+def test_colours_by_bumps_finer_than_a_subpixel_are_of_their_own_directions(
+    scene: Any, export: Any, render_cycles: Any, mitsuba: Any, asked: str
+) -> None:
+    """A mean of four belongs to none of them: 18, 13 and -17 % off."""
+    lit_scene(scene)
+    scene.render.resolution_x = scene.render.resolution_y = 64
+    material, scale = new_material("Target", Roughness=0.6), 60.0
+    displace(material, noise(material, scale), 4.0 / scale, "BUMP")
+    kind = {"Fresnel": "Fresnel", "Facing": "LayerWeight", "Normal": "NewGeometry"}[asked]
+    node = material.node_tree.nodes.new(f"ShaderNode{kind}")
+    output = node.outputs[0 if asked == "Fresnel" else asked]
+    material.node_tree.links.new(output, principled(material).inputs["Base Color"])
+    found, truth = recorded_and_cycles(export, render_cycles, ball(material))
+    assert abs(found.mean() / truth.mean() - 1.0) < 0.01
+
+
 @pytest.mark.skipif(bpy.app.version < (4, 4, 0), reason="its bumps have no Filter Width")
 def test_a_linked_filter_width_is_that_of_a_pixel(scene: Any, export: Any, render_cycles: Any, mitsuba: Any) -> None:
     lit_scene(scene)
