@@ -43,12 +43,13 @@ def other_sockets(material: str, node: bpy.types.Node, findings: Findings) -> di
 
 
 def _stretched(material: str, node: bpy.types.Node, findings: Findings) -> dict[str, Socket]:
-    """Anisotropy of a Glossy BSDF; what is linked to it is left out, with a note."""
+    """Anisotropy and Rotation of a Glossy BSDF; what is linked to them is left out, with a note."""
     anisotropy, rotation = (node.inputs.get(name) for name in ("Anisotropy", "Rotation"))
     if anisotropy is None or rotation is None:
         return {}
-    if anisotropy.is_linked or rotation.is_linked:
-        findings.note(f"Material '{material}': what is linked to Anisotropy of '{node.name}' is left out.")
+    for socket in (anisotropy, rotation):
+        if socket.is_linked:
+            findings.note(f"Material '{material}': what is linked to {socket.name} of '{node.name}' is left out.")
     if anisotropy.is_linked:
         return {}
     return stretched(float(anisotropy.default_value), float(rotation.default_value))

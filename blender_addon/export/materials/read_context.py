@@ -23,7 +23,7 @@ from ..nodes.leaf_kinds import (
     only_nearest,
     walks_of,
 )
-from ..nodes.shader_graph import UnsupportedNodeError, plain_value, read_socket, source_of, surface_of
+from ..nodes.shader_graph import UnsupportedNodeError, group_of_output, plain_value, read_socket, source_of, surface_of
 from ..nodes.target_shader import DIRECTIONS, Place
 from ..nodes.volumes import has_volume
 from .leaf_sockets import is_uv_tangent, other_sockets, read_value
@@ -59,6 +59,12 @@ def _read_surface(material: bpy.types.Material, tree: bpy.types.NodeTree, owner:
     node = surface_of(tree)
     if node is None:
         black = Material(material.name, "diffuse", {"Base Color": Socket((0.0, 0.0, 0.0))})
+        group = group_of_output(tree)
+        if group is not None:
+            findings.note(
+                f"Material '{material.name}' has its output inside the group '{group}', where only Cycles looks for "
+                "it: it is black in the fit. Move the output out of the group."
+            )
         return Material(material.name, "null") if has_volume(material) else black
     if node.bl_idname == PRINCIPLED:
         return _read_principled(material, node, findings)

@@ -115,6 +115,15 @@ def surface_of(tree: bpy.types.NodeTree | None) -> bpy.types.Node | None:
     return None if source is None else source.node
 
 
+def group_of_output(tree: bpy.types.NodeTree | None) -> str | None:
+    """The group node, of a tree without an output of its own, that has one with a surface, which Cycles shows then."""
+    if tree is None or active_output(tree) is not None:
+        return None
+    groups = (node for node in tree.nodes if node.bl_idname == "ShaderNodeGroup" and not node.mute and node.node_tree)
+    inside = (node.name for node in groups if surface_of(node.node_tree) or group_of_output(node.node_tree))
+    return next(inside, None)
+
+
 def plain_value(socket: bpy.types.NodeSocket) -> Any:
     """Return a socket's own value: float, bool, or a list of three (colours as linear Rec.709)."""
     value = socket.default_value

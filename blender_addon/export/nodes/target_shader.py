@@ -25,7 +25,7 @@ from .leaf_kinds import (
     kind_of,
     why_not_fitted,
 )
-from .shader_graph import Links
+from .shader_graph import Links, group_of_output
 from .volumes import AbsorbingVolume, absorbing_volume, lets_light_in
 
 ALL_LEAVES = "*"  # what a material keeps where all shaders of its mix are fitted
@@ -239,6 +239,9 @@ def why_no_target(material: bpy.types.Material) -> str:
             f"Material '{material.name}' shows {' and '.join(dict.fromkeys(leaf.node.bl_label for leaf in leaves))} "
             "alone, which reflects no light: link a Principled BSDF, directly, in a group or in a mix."
         )
+    group = group_of_output(node_tree_of(material))
+    if group is not None:
+        return f"Material '{material.name}' has its output inside the group '{group}': move it out of the group."
     return (
         f"Material '{material.name}' has no Principled BSDF linked to Surface of its output: link one, directly, in a "
         "group or in a mix."

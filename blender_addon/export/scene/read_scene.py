@@ -44,7 +44,7 @@ from ..render_state import (
     shown_by,
 )
 from ..steps import Steps
-from .origin import moved, note_far_scattering, scene_origin
+from .origin import moved, note_far_scattering, note_wide_scattering, scene_origin
 from .ray_visibility import camera_misses, hidden_from, note_visibility, shadow_transmission
 from .read_settings import name_render_settings, read_settings
 from .read_world import BLACK, read_world
@@ -171,6 +171,7 @@ def finish_scene(data: SceneData, findings: Findings, bakes: SceneBakes | None =
     """Put what `bakes` was asked for into the scene, and look whether there is light."""
     if bakes is not None:
         bakes.finish(data, findings)
+    note_wide_scattering(data, findings)
     for material in data.materials.values():
         below_zero = data.settings.gives_below_zero
         leaves = [leaf for leaf in (material, *material.leaves) if leaf.model == "emission" or below_zero]

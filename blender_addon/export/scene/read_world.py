@@ -21,6 +21,7 @@ from ..lights.negative_light import refuse_negative
 from ..nodes.dependence import turns_with_camera
 from ..nodes.shader_graph import (
     UnsupportedNodeError,
+    group_of_output,
     has_texture_mapping,
     mapping_matrix,
     read_socket,
@@ -55,6 +56,12 @@ def read_world(scene: bpy.types.Scene, exposure: float, findings: Findings, bake
         findings.note(f"World '{world.name}': its volume is left out.")
     node = surface_of(tree)
     if node is None:
+        group = group_of_output(tree)
+        if group is not None:
+            findings.note(
+                f"World '{world.name}' has its output inside the group '{group}', where only Cycles looks for it: it "
+                "is black in the fit. Move the output out of the group."
+            )
         return BLACK
     visibility = getattr(world, "cycles_visibility", None)
     camera = visibility is None or visibility.camera

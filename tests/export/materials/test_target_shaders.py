@@ -159,3 +159,18 @@ def test_a_colour_in_the_place_of_a_shader_alone_is_said(scene: Any) -> None:
     assert read_target(material, "Ball", 0, findings) is None
     (error,) = findings.errors
     assert error.startswith("Material 'Toon' shows Color Ramp alone, which reflects no light: link a Principled BSDF")
+
+
+@pytest.mark.parametrize("linked", ["Anisotropy", "Rotation"])
+def test_the_socket_of_a_glossy_bsdf_that_is_left_out_is_named(scene: Any, linked: str) -> None:
+    material = new_material("Brushed")
+    tree, output = material.node_tree, material.node_tree.get_output_node("CYCLES")
+    node = tree.nodes.new("ShaderNodeBsdfAnisotropic")
+    node.inputs["Anisotropy"].default_value = 0.5
+    tree.links.new(tree.nodes.new("ShaderNodeTexNoise").outputs[0], node.inputs[linked])
+    tree.links.new(node.outputs[0], output.inputs["Surface"])
+    findings = Findings()
+    read_target(material, "Pan", 0, findings)
+    assert [note for note in findings.notes if "left out" in note] == [
+        f"Material 'Brushed': what is linked to {linked} of '{node.name}' is left out."
+    ]

@@ -122,3 +122,23 @@ def test_what_is_near_stays_where_it_is(distance: float, height: float, is_far: 
     target.location.x = distance
     add_camera("PERSP", (distance, 0.0, height))
     assert ("origin" in export(target).request["generator"]) is is_far
+
+
+@pytest.mark.parametrize("who", ["Target", "Neighbour"])
+def test_light_that_walks_as_far_as_its_object_is_large_is_named(scene: Any, export: Any, who: str) -> None:
+    """A target of 1 m from 2 m on, another object from 0.5 m on; 0.4 m is said of neither."""
+    world_color(scene, 1.0)
+    add_camera()
+    target, other = (
+        add_quad(name, 1.0, height, new_material(name)) for name, height in (("Target", 0), ("Neighbour", -1))
+    )
+    shader = {"Target": target, "Neighbour": other}[who].data.materials[0].node_tree.nodes["Principled BSDF"]
+    shader.inputs["Subsurface Weight"].default_value = 1.0
+    shader.inputs["Subsurface Radius"].default_value = (1.0, 0.2, 0.1)
+    named = [
+        f"Light walks below the surface of material '{who}' half as far as its object is large, or further (Subsurface "
+        "Scale times Radius): how bright that is differs from Cycles."
+    ]
+    for scale, said in ((0.4, []), (1.0, [] if who == "Target" else named), (2.2, named)):
+        shader.inputs["Subsurface Scale"].default_value = scale
+        assert [note for note in export(target).notes if "walks" in note] == said

@@ -12,6 +12,8 @@ import bpy
 import numpy as np
 import pytest
 
+from blender_addon.export.job import ExportError
+
 from .test_baked_surfaces import Nodes, shape_of, stage
 
 __all__ = ["stage"]  # the fixture
@@ -122,3 +124,36 @@ def test_many_pictures_that_are_read_by_colour_and_alpha(stage: Any, export: Any
     assert not any("could not be baked" in note for note in report.notes)
     sockets = report.request["materials"][shape_of(report)[0]]["sockets"]
     assert sockets["Metallic"]["value"] == pytest.approx(0.5, abs=0.005)
+
+
+def _wrapped(tree: bpy.types.NodeTree, *, is_world: bool) -> None:
+    """Put an output with a shader into a group, and leave none outside."""
+    tree.nodes.clear()
+    group = bpy.data.node_groups.new("Wrapped", "ShaderNodeTree")
+    output = group.nodes.new("ShaderNodeOutputWorld" if is_world else "ShaderNodeOutputMaterial")
+    shader = group.nodes.new("ShaderNodeBackground" if is_world else "ShaderNodeBsdfPrincipled")
+    group.links.new(shader.outputs[0], output.inputs["Surface"])
+    tree.nodes.new("ShaderNodeGroup").node_tree = group
+
+
+@pytest.mark.parametrize("owner", ["target", "neighbour", "world"])
+def test_an_output_inside_a_group_is_named(owner: str, stage: Any, export: Any, render_cycles: Any) -> None:
+    """Cycles looks for it there: the neighbour was black without a word, and the target without a shader."""
+    target, _, nodes = stage
+    scene = bpy.context.scene
+    scene.render.resolution_x = scene.render.resolution_y = 32
+    trees = {"target": target.data.materials[0].node_tree, "neighbour": nodes.tree, "world": scene.world.node_tree}
+    _wrapped(trees[owner], is_world=owner == "world")
+    assert render_cycles().min() > 0.02
+    if owner == "target":
+        with pytest.raises(ExportError, match="has its output inside the group 'Group': move it out of the group"):
+            export(target)
+        return
+    lamp = bpy.data.objects.new("Sun", bpy.data.lights.new("Sun", "SUN"))
+    scene.collection.objects.link(lamp)  # without it an export has no light
+    name = {"neighbour": "Material 'Ball'", "world": "World 'World'"}[owner]
+    said = (
+        f"{name} has its output inside the group 'Group', where only Cycles looks for it: it is black in the fit. Move "
+        "the output out of the group."
+    )
+    assert said in export(target).notes
