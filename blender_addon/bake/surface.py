@@ -103,7 +103,7 @@ def _leaves(closures: ClosureTree, baked: _Bake) -> list[dict[str, Any]]:
         for socket in leaf.node.inputs:
             if socket.name not in SKIPPED and socket.type != "SHADER" and socket.enabled:
                 several = socket.type != "VALUE"  # whatever is linked: a colour on Roughness is one number
-                asked.append((found["sockets"], socket.name, closures.value(leaf.path, socket), several))
+                asked.append((found["sockets"], socket.name, closures.bounded(leaf, socket), several))
         leaves.append(found)
     baked.values(asked)
     for found, leaf in zip(leaves, reflecting, strict=True):

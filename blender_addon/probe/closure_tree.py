@@ -12,11 +12,18 @@ from typing import Any
 
 import bpy
 
+from ..export.nodes.leaf_kinds import EMISSION
 from ..export.nodes.shader_graph import Links
 from ..versions import active_output
 
 Path = tuple[bpy.types.Node, ...]  # group nodes, outermost first
 Value = Any  # a number, or an output socket of the top tree
+# sockets of shaders whose numbers Cycles keeps within bounds, beside all colours, which are above zero
+FROM_ZERO_TO_ONE = (
+    *("Alpha", "Roughness", "Metallic", "Diffuse Roughness", "Transmission Weight", "Subsurface Weight"),
+    *("Coat Roughness", "Sheen Roughness"),
+)
+ABOVE_ZERO = ("Coat Weight", "Sheen Weight", "Specular IOR Level")
 DEEPEST = 64  # group nodes and mixes within each other; a tree that is deeper holds a circle
 
 
@@ -35,6 +42,7 @@ class ClosureTree:
     def __init__(self, tree: bpy.types.NodeTree) -> None:
         self._tree = tree
         self._at_tops: dict[tuple[int, ...], bpy.types.NodeSocket] = {}
+        self._bounded: dict[tuple[int, str], bpy.types.NodeSocket] = {}
         output = active_output(tree)
         self.leaves: list[Leaf] = []
         if output is not None:
@@ -49,6 +57,16 @@ class ClosureTree:
             if source.node.bl_idname != "NodeGroupInput" or not path:
                 return self._at_top(path, source)
             socket, path = _by_identifier(path[-1].inputs, source.identifier), path[:-1]
+
+    def bounded(self, leaf: Leaf, socket: bpy.types.NodeSocket) -> Value:
+        """What feeds a socket of a leaf, within the bounds that Cycles keeps; its own value as it is."""
+        value = self.value(leaf.path, socket)
+        if not hasattr(value, "is_output"):
+            return value
+        place = value.as_pointer(), _bounds(leaf.node, socket)
+        if place not in self._bounded:
+            self._bounded[place] = within_bounds(self._tree, leaf.node, socket, value)
+        return self._bounded[place]
 
     def _walk(self, path: Path, socket: bpy.types.NodeSocket, weight: Value, depth: int) -> None:
         source = _source(socket)
@@ -122,6 +140,36 @@ class ClosureTree:
         if isinstance(second, float) and second == 1.0:
             return first
         return self._math("MULTIPLY", first, second)
+
+
+def within_bounds(
+    tree: bpy.types.NodeTree, shader: bpy.types.Node, socket: bpy.types.NodeSocket, source: bpy.types.NodeSocket
+) -> bpy.types.NodeSocket:
+    """The source of a shader's socket as Cycles takes it, sample by sample: a mean of what is beyond is not the same.
+
+    An emission below zero is left, as it is refused.
+    """
+    bounds = _bounds(shader, socket)
+    if not bounds:
+        return source
+    node: Any = tree.nodes.new("ShaderNodeVectorMath" if bounds == "colour" else "ShaderNodeMath")
+    node.operation = "MAXIMUM"
+    node.inputs[1].default_value = (0.0, 0.0, 0.0) if bounds == "colour" else 0.0
+    if bounds == "share":
+        node.use_clamp = True
+    tree.links.new(source, node.inputs[0])
+    return node.outputs[0]
+
+
+def _bounds(shader: bpy.types.Node, socket: bpy.types.NodeSocket) -> str:
+    """Which bounds a socket has: those of a `colour`, of a `share` or an `amount`; nothing without any."""
+    if shader.bl_idname == EMISSION or socket.name.startswith("Emission"):
+        return ""
+    if socket.type == "RGBA":
+        return "colour"
+    if socket.name in FROM_ZERO_TO_ONE:
+        return "share"
+    return "amount" if socket.name in ABOVE_ZERO else ""
 
 
 def own_groups(tree: bpy.types.NodeTree, depth: int = 0) -> list[bpy.types.NodeTree]:

@@ -21,7 +21,7 @@ from ..export.nodes.displacement import SHADING_NORMAL, bends_normals
 from ..export.nodes.shader_graph import source_of
 from ..versions import active_output
 from .aov_render import Frame, frame_of, render_outputs
-from .closure_tree import ClosureTree, Leaf
+from .closure_tree import ClosureTree, Leaf, within_bounds
 from .graph_copy import node_at, nodes_of, own_copy, remove_copy
 from .server import ProbeRequestError
 
@@ -212,7 +212,7 @@ def write_outputs(tree: bpy.types.NodeTree, path: list[str], outputs: Mapping[st
         if source is None:
             raise ProbeRequestError(f"{name} of '{shader.name}' has no link any more.")
         kinds[name] = "VALUE" if socket.type not in ("RGBA", "VECTOR") else socket.type
-        _output(inner, output, source, kinds[name] != "VALUE")
+        _output(inner, output, within_bounds(inner, shader, socket, source), kinds[name] != "VALUE")
     return kinds
 
 
