@@ -38,19 +38,29 @@ def note_coplanar_faces(
     camera: Camera,
     findings: Findings,
 ) -> Steps[None]:
-    """Report faces in the plane of faces of an object that is fitted, of which `seen` has points (n, 3)."""
+    """Report faces in the plane of faces of an object that the camera sees, of which `seen` has points (n, 3)."""
     if sum(len(mesh.triangles) for _, mesh in places) >= MANY:
         yield APART
+    bounds = [(mesh.positions.min(axis=0), mesh.positions.max(axis=0)) for _, mesh in places if len(mesh.positions)]
+    filled = [place for place in places if len(place[1].positions)]
     for own, points in seen.items():
         if not len(points):
             continue
         reach = COPLANAR * (camera.project(points)[1] + np.abs(points).max(axis=1))
-        found = [name for name, mesh in places if most_around(points, reach, mesh) > (name == own)]
+        low, high = points.min(axis=0) - reach.max(), points.max(axis=0) + reach.max()
+        near = [place for place, (least, most) in zip(filled, bounds, strict=True) if _meet(low, high, least, most)]
+        found = [name for name, mesh in near if most_around(points, reach, mesh) > (name == own)]
         for other in dict.fromkeys(found):
             if other == own:
                 findings.note(_twice(own))
             elif not {_same_place(own, other), _same_place(other, own)} & set(findings.notes):
                 findings.note(_same_place(own, other))
+
+
+def _meet(*ends: NDArray[np.floating]) -> bool:
+    """Whether two boxes, each with its lowest and highest corner, have a place in common."""
+    low, high, least, most = ends
+    return bool((least <= high).all() and (most >= low).all())
 
 
 def _twice(name: str) -> str:
@@ -63,5 +73,5 @@ def _twice(name: str) -> str:
 def _same_place(first: str, second: str) -> str:
     return (
         f"'{first}' and '{second}' have faces in the same place: which of them is seen is left to chance, in "
-        "Cycles and in the fit."
+        "Cycles and in the fit, and in Cycles they shadow each other."
     )

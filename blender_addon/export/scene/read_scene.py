@@ -50,7 +50,7 @@ from .read_settings import name_render_settings, read_settings
 from .read_world import BLACK, read_world
 from .scene_bakes import SceneBakes, Surface
 from .scene_data import SceneData, Shape, Terminator, target_bsdf, target_shape
-from .visibility import check_visible, say_no_faces
+from .visibility import check_visible, met_points, say_no_faces
 
 SILENT_TYPES = ("EMPTY", "ARMATURE", "LATTICE", "CAMERA", "SPEAKER", "LIGHT_PROBE")
 _NO_POINTS = np.zeros((0, 3), np.float32)
@@ -156,6 +156,7 @@ def _read(
                 findings.take_over(of_one, (each.object.name, each.slot))
         if not all(pieces):
             return None
+        of_others = met_points(data, scene, depsgraph)
         for number, each in enumerate(fitted):
             of_one = Findings()
             seen = check_visible(data, pieces[number], each.object, each.slot, scene, depsgraph, of_one)
@@ -164,6 +165,7 @@ def _read(
                 data.unseen[number] = of_one.errors[0]
                 if not may_miss:
                     findings.error(of_one.errors[0], *of_one.fixes[of_one.errors[0]])
+        walk.seen = of_others | walk.seen
     return walk
 
 
@@ -209,7 +211,7 @@ class _Walk:
         self.target_shadows: list[list[float | None]] = [[] for _ in targets]  # `shadow_transmission` of the instances
         self.bodies = 0
         self.places: list[tuple[str, TriangleMesh]] = []
-        self.seen: dict[str, NDArray[np.float64]] = {}  # points of each object that is fitted
+        self.seen: dict[str, NDArray[np.float64]] = {}  # points of what the camera sees
         data.target_count = len(targets)
         self.bsdfs: dict[str, str] = {}
         for number, (each, material) in enumerate(zip(targets, materials, strict=True)):

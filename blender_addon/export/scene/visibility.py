@@ -1,9 +1,10 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Whether the camera sees the target at all."""
+"""Whether the camera sees the target at all, and what else it sees."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
+from itertools import product
 
 import bpy
 import numpy as np
@@ -21,6 +22,7 @@ from .scene_data import SceneData
 PROBES = 2000
 MET = 1e-4  # of a ray's length: it has met a point that it was aimed at; Blender's rays are single precision
 MOST_SEEN = 200  # points of the target, of those that a ray meets, are looked for
+RAYS = 12  # along each side of the frame, where it is looked for what lies in one plane
 OUTSIDE = "The camera does not see '{obj}': move it into the frame."
 
 
@@ -84,6 +86,26 @@ def say_no_faces(fitted: FittedSlot, view_layer: bpy.types.ViewLayer, left_out: 
         findings.error(f"No face of '{name}' uses its active material slot {fitted.slot + 1}: choose another.")
     else:
         findings.error(f"No face of '{name}' uses its material slot {fitted.slot + 1}: choose another.")
+
+
+def met_points(
+    data: SceneData, scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph
+) -> dict[str, NDArray[np.float64]]:
+    """Points (n, 3) where rays all over the frame first meet each object, by its name."""
+    corners = np.array([scene.camera.matrix_world @ corner for corner in scene.camera.data.view_frame(scene=scene)])
+    world, found = data.camera.world, dict[str, list[NDArray[np.float64]]]()
+    forward, eye = -world[:3, 2], data.origin + world[:3, 3]
+    steps = (np.arange(RAYS) + 0.5) / RAYS
+    for along, down in product(steps, steps):
+        place = corners[0] + (corners[1] - corners[0]) * down + (corners[3] - corners[0]) * along
+        is_flat = data.camera.kind == "ORTHO"
+        direction = forward if is_flat else place - eye
+        start = place - forward * (forward @ (place - eye)) if is_flat else eye
+        start = start + direction * (data.camera.clip_start / float(direction @ forward))
+        hit, at, _, _, item, _ = scene.ray_cast(depsgraph, Vector(start), Vector(direction))
+        if hit:
+            found.setdefault(item.name, []).append(np.array(at) - data.origin)
+    return {name: np.array(points) for name, points in found.items()}
 
 
 def _is_put_away(item: bpy.types.Object) -> bool:

@@ -191,6 +191,23 @@ def test_faces_in_the_same_place_are_named(scene: Any) -> None:
     assert sum("'A' and 'B' have faces in the same place" in note for note in notes) == 1
 
 
+@pytest.mark.parametrize("kind", ["ORTHO", "PERSP"])
+def test_others_in_one_plane_that_the_camera_sees_are_named(scene: Any, render_cycles: Any, kind: str) -> None:
+    """Floors of two sizes share no corner: they were black in Cycles alone, and nothing was said."""
+    item = lit_quad(scene)
+    scene.camera.data.type = kind
+    floor, other = (add_quad(f"Floor {size}", size, -1.0, new_material(str(size))) for size in (20.0, 19.0))
+    bpy.context.view_layer.update()
+    _, notes = check_export(bpy.context, item)
+    assert sum("have faces in the same place" in note and "Floor" in note for note in notes) == 1
+    dark = render_cycles()[0, 0].mean()
+    other.location.z = -0.5
+    bpy.context.view_layer.update()
+    assert not any("have faces in the same place" in note for note in check_export(bpy.context, item)[1])
+    assert dark < 0.2 * render_cycles()[0, 0].mean()
+    assert floor.location.z == 0.0
+
+
 def test_a_world_that_the_camera_does_not_see(scene: Any, export: Any, render_cycles: Any, render_mitsuba: Any) -> None:
     item = lit_quad(scene)
     world_color(scene, 0.5)
