@@ -17,6 +17,7 @@ from .clamp import saturate
 from .own_memory import own_memory
 
 _TABLES: list[GridTable] = []
+_OTHERS: list[Any] = []  # buffers of tables that are no grid
 MOST_SLICES = 32  # of a table: each is state that a frozen launch carries along
 
 
@@ -100,9 +101,15 @@ def _literal(place: Any) -> float | None:
     return float(array[0]) if known and dr.width(array) == 1 else None
 
 
+def other_buffer(numbers: NDArray[Any], float_type: type) -> Any:
+    """The numbers of a table that is no grid and lives as long as the process, as an evaluated array."""
+    _OTHERS.append(own_memory(numbers, float_type))
+    return _OTHERS[-1]
+
+
 def loaded_buffers() -> list[Any]:
     """Buffers of all tables read so far: what a frozen launch has to name as its state."""
-    return [buffer for table in _TABLES for buffer in table._buffers.values()]
+    return [*_OTHERS, *(buffer for table in _TABLES for buffer in table._buffers.values())]
 
 
 @cache

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from ..arrays import dual as dr
 from ..arrays.clamp import saturate
-from ..arrays.own_memory import own_memory
+from ..arrays.grid_table import other_buffer
 
 # Linear Rec.709 from CIE XYZ, white D65 (IEC 61966-2-1), and that white
 XYZ_TO_RGB = np.array(
@@ -57,7 +57,7 @@ def _packed(float_type: type) -> Any:
     with (resources.files("mfo_backend.material") / "tables" / "thin_film.npz").open("rb") as file:
         rows = np.load(file, allow_pickle=False)["response"]
     zeros = np.zeros((len(rows), 1))
-    return own_memory(np.concatenate([rows[:, :3], zeros, rows[:, 3:], zeros], axis=1).ravel(), float_type)
+    return other_buffer(np.concatenate([rows[:, :3], zeros, rows[:, 3:], zeros], axis=1).ravel(), float_type)
 
 
 def fourier_response(path_nm: Any, colour: Callable[..., Any]) -> tuple[Any, Any]:

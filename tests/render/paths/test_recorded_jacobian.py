@@ -180,20 +180,25 @@ def test_another_fixed_value_needs_no_other_kernel(recording):
     assert np.abs(after - before).max() > 0.05
 
 
-def test_tables_are_loaded_before_the_launch_is_recorded(recording, monkeypatch):
+@pytest.mark.parametrize("more", [{"sheen_weight": 0.5}, {"thin_film_thickness": 350.0, "thin_film_ior": 1.4}],
+                         ids=["sheen", "film"])  # fmt: skip
+def test_tables_are_loaded_before_the_launch_is_recorded(recording, monkeypatch, more):
     from mfo_backend.material.arrays import grid_table
+    from mfo_backend.material.lobes import colour_interference
     from mfo_backend.material.recorded_models import BlenderPrincipledModel
     from mfo_backend.render.paths.recorded_jacobian import RecordedJacobian
 
     for table in grid_table._TABLES:  # as in a process that has not evaluated this material yet
         monkeypatch.setattr(table, "_buffers", {})
         monkeypatch.setattr(table, "_slices", {})
+    colour_interference._packed.cache_clear()
     (_, paths), model = recording, BlenderPrincipledModel()
-    table = model.table.select(["base_color", "roughness", "sheen_weight"])
-    jacobian = RecordedJacobian(model, table, model.values({}, table.names))
-    loaded = len(model.buffers())
-    assert np.isfinite(jacobian(middle(table), *lanes(paths, paths.tile_groups()))).all()
-    assert len(model.buffers()) == loaded > 0
+    table = model.table.select(["base_color", "roughness", *more])
+    for derivatives in (True, False):  # the second launch finds the tables of the first
+        jacobian = RecordedJacobian(model, table, model.values({}, table.names), derivatives=derivatives)
+        loaded = len(model.buffers())
+        assert np.isfinite(jacobian(middle(table), *lanes(paths, paths.tile_groups()))).all()
+        assert len(model.buffers()) == loaded > 0
 
 
 def test_a_launch_runs_no_python_that_dr_jit_starts_under_its_lock(recording):
