@@ -34,6 +34,7 @@ class Parameter:
     `size` is 1 for a scalar and 3 for a linear RGB colour. `lower` and `upper` bound every component during a fit.
     Where the renderer's own gradient is not defined up to there, it is that at `slope_upper`. `label` is what its node
     calls it, where that is not the socket of its name. A search from nothing begins at `begin`, or between the bounds.
+    Values that are a whole number of `period` apart are the same.
     """
 
     name: str
@@ -44,6 +45,7 @@ class Parameter:
     slope_upper: float = math.inf
     label: str = ""
     begin: Value | None = None
+    period: float = math.inf
 
     @property
     def shown(self) -> str:
@@ -167,7 +169,26 @@ class ParameterTable(Sequence[Parameter]):
 
     def apart(self, first: Vector, second: Vector) -> float:
         """How far two vectors differ in some value, as a part of its range."""
-        return float(np.max(np.abs(first - second) / self.width))
+        return float(np.max(self.away(first, second)))
+
+    def away(self, first: Vector, second: Vector) -> Vector:
+        """How far each value of two vectors differs, as a part of its range, shape (length,)."""
+        period = np.concatenate([np.zeros(0), *(np.full(p.size, p.period) for p in self._parameters)])
+        ways, periodic = np.abs(first - second), np.isfinite(period)
+        turns = np.round(ways[periodic] / period[periodic])
+        ways[periodic] = np.abs(ways[periodic] - period[periodic] * turns)
+        return ways / self.width
+
+    def near(self, vector: Vector, other: Vector) -> Vector:
+        """The same values as those of `vector`, which is within the bounds, the nearest to those of `other` there."""
+        found = vector.copy()
+        for p in self._parameters:
+            if math.isfinite(p.period):
+                entry = self._slices[p.name]
+                value = vector[entry]
+                fewest, most = np.ceil((p.lower - value) / p.period), np.floor((p.upper - value) / p.period)
+                found[entry] += p.period * np.clip(np.round((other[entry] - value) / p.period), fewest, most)
+        return found
 
     def clip(self, vector: NDArray[np.float64]) -> NDArray[np.float64]:
         """The nearest vector inside the bounds."""

@@ -29,6 +29,27 @@ def test_names_as_users_write_them(text):
     assert parameter_name(text) == "base_color"
 
 
+TURNING = ParameterTable([*TABLE, Parameter("anisotropic_rotation", 1, 0.0, 1.0, 0.0, period=0.5)])
+
+
+@pytest.mark.parametrize(
+    ("turn", "other", "nearest", "apart"),
+    [
+        (0.5, 0.0, 0.0, 0.0),
+        (0.6, 0.05, 0.1, 0.05),
+        (0.1, 0.9, 0.6, 0.2),
+        (0.98, 0.02, 0.48, 0.04),
+        (0.3, 0.3, 0.3, 0.0),
+    ],
+)
+def test_values_a_period_apart_are_one(turn, other, nearest, apart):
+    first, second = (TURNING.pack({"roughness": 0.2, "anisotropic_rotation": value}) for value in (turn, other))
+    found = TURNING.near(first, second)
+    assert TURNING.value(found, "anisotropic_rotation") == pytest.approx(nearest)
+    np.testing.assert_array_equal(found[:4], first[:4])
+    assert TURNING.apart(first, second) == TURNING.apart(second, first) == pytest.approx(apart)
+
+
 def test_a_typing_error_gets_the_nearest_name():
     with pytest.raises(
         BadInputError, match=r"Unknown parameter 'Rougness' \(the nearest is roughness\): this material"

@@ -84,7 +84,7 @@ def rival_notes(rivals: Sequence[Rival], x: NDArray[np.float64], table: Paramete
     """A sentence for each likely rival of `x`, likeliest first, with the values that differ most."""
     notes = []
     for rival in sorted(rivals, key=lambda rival: -rival.share):
-        away = np.abs(rival.x - x) / table.width
+        away = table.away(rival.x, x)
         names = [name for name in table.names if _matters(name, x, rival.x, table)]
         change = {name: float(away[table.slice_of(name)].max()) for name in names}
         told = [name for name in sorted(change, key=lambda n: -change[n]) if change[name] > TELLING][:MOST_TOLD]

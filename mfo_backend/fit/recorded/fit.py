@@ -154,6 +154,7 @@ class RecordedRoute:
             end = refine_sampled(setting, started.basins, _censored(RelativeResidual, task), _weighted(task))
         else:
             end = refine_exact(setting, started, _censored(log_residual, task))
+        end = replace(end, refined=end.refined.near(setting.table, setting.user))
         del started  # and with it the first recording
         weighted = setting.sampled
         kept = keep_values(end, weighted=weighted, seen=None if weighted else self._judge(blurred=False).value)

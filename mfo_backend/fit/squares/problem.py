@@ -4,7 +4,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -13,6 +13,7 @@ from ...render.paths.recorded_image import RecordedImage
 from ...render.paths.recorded_paths import LaneGroups
 from ...render.pictures.renderer import Vector
 from ...solve.bounded_least_squares import NormalEquations
+from ...types.parameter import ParameterTable
 from ..tolerances import DIM_FLOOR
 from .recording_noise import rows_of_samples, unbiased_equations
 from .residuals import Residual, normal_equations
@@ -97,3 +98,9 @@ class Refined:
     off: tuple[str, ...] = ()
     rivals: tuple[Rival, ...] = ()
     richer: tuple[Vector, ...] = ()
+
+    def near(self, table: ParameterTable, vector: Vector) -> Refined:
+        """The same materials by the values nearest to those of a vector, the rivals' by those nearest to the first."""
+        x = table.near(self.x, vector)
+        rivals = tuple(replace(rival, x=table.near(rival.x, x)) for rival in self.rivals)
+        return replace(self, x=x, rivals=rivals, richer=tuple(table.near(other, x) for other in self.richer))

@@ -18,7 +18,7 @@ BLENDER_PRINCIPLED = ParameterTable(
         Parameter("specular_ior_level", 1, 0.01, 1.0, 0.5),
         Parameter("specular_tint", 3, 0.0, 1.0, (1.0, 1.0, 1.0)),
         Parameter("anisotropic", 1, 0.0, 1.0, 0.0),
-        Parameter("anisotropic_rotation", 1, 0.0, 1.0, 0.0),
+        Parameter("anisotropic_rotation", 1, 0.0, 1.0, 0.0, period=0.5),  # full turns; half of one is the same lobe
         Parameter("transmission_weight", 1, 0.0, 1.0, 0.0),
         Parameter("coat_weight", 1, 0.0, 1.0, 0.0),
         Parameter("coat_roughness", 1, 0.03, 1.0, 0.03),

@@ -8,8 +8,9 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from mfo_backend.fit.squares.problem import Problem
+from mfo_backend.fit.squares.problem import Problem, Refined, Rival
 from mfo_backend.render.paths.recorded_image import TwoSamples
+from mfo_backend.types.parameter import Parameter, ParameterTable
 
 RADIANCE, GROUPS = 2.0, 20_000
 
@@ -50,3 +51,15 @@ def test_the_share_is_at_most_one_where_the_halves_differ_by_more_than_the_resid
     evaluate = SimpleNamespace(samples=lambda x: TwoSamples(0.5 * apart, apart))
     exact = Problem(evaluate, lambda image: (image, np.ones_like(image)), range(4))
     assert exact.own_share(np.zeros(1)) == 1.0
+
+
+def test_a_solution_and_its_rivals_are_told_by_the_nearest_turn():
+    table = ParameterTable(
+        [Parameter("roughness", 1, 0.0, 1.0, 0.5), Parameter("anisotropic_rotation", 1, 0.0, 1.0, 0.0, period=0.5)]
+    )
+    rival = Rival(np.array([0.7, 0.1]), 0.2)
+    refined = Refined(np.array([0.3, 0.55]), problem(None), problem(None), rivals=(rival,), richer=(rival.x,))
+    found = refined.near(table, np.array([0.5, 0.0]))
+    np.testing.assert_allclose(found.x, [0.3, 0.05])
+    np.testing.assert_allclose(found.rivals[0].x, [0.7, 0.1])
+    np.testing.assert_allclose(refined.near(table, np.array([0.5, 0.9])).rivals[0].x, [0.7, 0.6])

@@ -60,6 +60,21 @@ def finite(what: str, array: Any) -> np.ndarray:
     return numbers
 
 
+PERIODIC = [parameter for parameter in BLENDER_PRINCIPLED if math.isfinite(parameter.period)]
+
+
+@pytest.mark.parametrize("parameter", PERIODIC, ids=lambda parameter: parameter.name)
+@given(values=box(BLENDER_PRINCIPLED))
+def test_a_value_a_period_away_is_the_same_material(parameter: Any, values: dict[str, Any]) -> None:
+    view, light = hemisphere(LANES, 1, both=False), hemisphere(LANES, 2, both=True)
+    here = {**values, parameter.name: values[parameter.name] * parameter.period}
+    found = []
+    for moved in (here, {**here, parameter.name: here[parameter.name] + parameter.period}):
+        layers = layer_stack(as_arrays(moved), view, ALL_LOBES, BLENDER_5_0)
+        found.append(np.array(evaluate(layers, layers.to_frame(light))))
+    np.testing.assert_allclose(found[0], found[1], rtol=0.02, atol=1e-4 * np.abs(found[0]).max())
+
+
 @given(values=box(BLENDER_PRINCIPLED))
 def test_blender_s_values_densities_and_samples(values: dict[str, Any]) -> None:
     view, light = hemisphere(LANES, 1, both=False), hemisphere(LANES, 2, both=True)
