@@ -38,7 +38,7 @@ class Socket:
     `by_graph` says that nodes give it which Cycles has to evaluate; `seen` is the file with what they give where the
     camera sees the surface, `elsewhere` that for other rays if it hangs on the ray, and `value` the mean of the first,
     once that is done. A normal that is `turned` has the opposite direction on the other side of the surface; others are
-    mirrored there.
+    mirrored there. `by_mesh` says that the mesh holds it, a tangent.
     """
 
     value: Any
@@ -48,6 +48,7 @@ class Socket:
     seen: Path | None = None
     elsewhere: Path | None = None
     turned: bool = False
+    by_mesh: bool = False
 
     @property
     def varies(self) -> bool:
@@ -62,7 +63,8 @@ class Material:
     A mix and a bumped surface have `parts`, and of sockets those of emission alone. `normal` (height, width, 3) has
     normals in the frame of the UV map, n / 2 + 1 / 2; where it is `displaced` these take the place of the mesh's
     smooth ones, as a displacement by bump does, and where `turned` they have the opposite direction on the other side
-    of the surface, as those of a socket. Without `transparent_shadows` no light passes into a shadow.
+    of the surface, as those of a socket. Without `transparent_shadows` no light passes into a shadow. Tangents that are
+    `circling` an axis of the object are in its meshes.
     `shader` is the backend's word for lobes that are not all of a Principled BSDF.
 
     The target may be one leaf of a mix: `weight` is its share, and `leaves` are the others with theirs. `node` is the
@@ -83,6 +85,7 @@ class Material:
     displaced: bool = False
     turned: bool = False
     transparent_shadows: bool = True
+    circling: bool = False
     shader: str = "principled"
     weight: Socket = Socket(1.0)
     leaves: tuple[Material, ...] = ()

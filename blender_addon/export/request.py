@@ -125,6 +125,8 @@ def _socket(socket: Socket, files: SceneFiles, seen: bool) -> dict[str, Any]:
     described = {"value": list(value) if isinstance(value, (list, tuple)) else value, "linked": socket.linked}
     if socket.texture is not None:
         described["texture"] = files.texture(socket.texture)
+    if socket.by_mesh:
+        described["mesh"] = True
     if seen and socket.seen is not None:
         described["graph"] = f"{GRAPH_FOLDER}/{socket.seen.name}"
         if socket.elsewhere is not None:

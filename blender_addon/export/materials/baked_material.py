@@ -15,11 +15,11 @@ from ..findings import Findings
 from ..images.color_space import to_rec709
 from ..lights.light_model import takes_light
 from ..material_model import Material, Part, Socket, Texture
+from ..nodes.circling import TURNED
 from ..nodes.leaf_kinds import CONDUCTOR, KINDS, TRANSPARENT
 from .leaf_sockets import GLOSSY, HELD, conductor_colors, stretched
 
 EMISSION = ("Emission Color", "Emission Strength")
-TURNED = ("Anisotropic", "Anisotropy")  # sockets that turn highlights along a tangent
 WHITE = 1e-3  # a Transparent BSDF this far from 1 counts as white
 BLACK = Socket((0.0, 0.0, 0.0))
 MISSING = 1e-3  # of the weights' sum, below which nothing is missing
@@ -30,10 +30,13 @@ _Weighted = tuple[NDArray[np.float32], Material]
 
 
 class Baked:
-    """Files and values of one answer of `bake.surface.baked_surface`."""
+    """Files and values of one answer of `bake.surface.baked_surface`.
 
-    def __init__(self, answer: Mapping[str, Any], folder: Path) -> None:
-        self._answer, self._folder = answer, folder
+    `circles` says that meshes hold the tangents of all its shaders.
+    """
+
+    def __init__(self, answer: Mapping[str, Any], folder: Path, *, circles: bool = False) -> None:
+        self._answer, self._folder, self._circles = answer, folder, circles
 
     @property
     def corners(self) -> NDArray[np.float32]:
@@ -100,6 +103,8 @@ class Baked:
             sockets |= {ours: Socket(c.mean(axis=(0, 1)).tolist(), True, _picture(c)) for ours, c in (*own, *colours)}
         if "Emission Strength" in sockets:
             sockets["Emission Strength"] = Socket(0.0)
+        if self._circles:
+            sockets["Tangent"] = Socket([0.0, 0.0, 0.0], True, by_mesh=True)
         normal = None
         if "normal" in leaf:
             normal = _texture((0.5 * np.load(self._folder / leaf["normal"]) + 0.5).astype(np.float32))
@@ -174,10 +179,11 @@ class Baked:
             findings.note(f"Material '{name}': {asked} sees its own object alone in the fit.")
         if self._answer["sides"]:
             findings.note(f"Material '{name}' asks for Backfacing: in the fit both sides are as its front is.")
-        if self._answer["left_out"]:
-            left = ", ".join(self._answer["left_out"])
-            findings.note(f"Material '{name}': what is linked to {left} is left out.")
-        if any(leaf["sockets"].get(turned, 0.0) != 0.0 for leaf in self._answer["leaves"] for turned in TURNED):
+        left_out = [socket for socket in self._answer["left_out"] if not (self._circles and socket == "Tangent")]
+        if left_out:
+            findings.note(f"Material '{name}': what is linked to {', '.join(left_out)} is left out.")
+        turned = any(leaf["sockets"].get(own, 0.0) != 0.0 for leaf in self._answer["leaves"] for own in TURNED)
+        if turned and not self._circles:
             findings.note(f"Material '{name}': its anisotropy follows the UV map of the bake.")
         if self._answer["paths"]:
             asked = ", ".join(self._answer["paths"])

@@ -151,6 +151,11 @@ def _principled(material: Material, save: Callable[[Texture], str], findings: Fi
             f"Material '{material.name}': the emission is not dimmed by {', '.join(above)} in a fit with the model "
             "mitsuba_principled."
         )
+    if material.value("Anisotropic", 0.0) != 0.0 and material.sockets.get("Tangent", Socket(0.0)).by_mesh:
+        findings.note_of_mitsuba(
+            f"Material '{material.name}': its highlights turn along the UV map in a fit with the model "
+            "mitsuba_principled."
+        )
     for sentence in approximated(material):
         findings.note(f"Material '{material.name}': {sentence}")
     element = plugin("bsdf", "principled")

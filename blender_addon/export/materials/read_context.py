@@ -12,6 +12,7 @@ from ..findings import Findings
 from ..images.color_space import to_rec709
 from ..images.image_pixels import without_pixels
 from ..material_model import Material, Socket, grey
+from ..nodes.circling import turned_axis, turns_highlights
 from ..nodes.displacement import bends_normals
 from ..nodes.leaf_kinds import (
     EMISSION,
@@ -115,8 +116,7 @@ def _read_other(
         material.name, "principled", sockets, distribution_of(node), walks_of(node), shader=kind.shader,
         transparent_shadows=material.use_transparent_shadow,
     )  # fmt: skip
-    _note_directions(found, node, findings)
-    return found
+    return replace(found, sockets=found.sockets | _directions(material, node, findings))
 
 
 def needs_bake(material: bpy.types.Material | None) -> bool:
@@ -145,27 +145,22 @@ def _read_principled(material: bpy.types.Material, node: bpy.types.Node, finding
     """A Principled BSDF that is not fitted."""
     sockets: dict[str, Socket] = {}
     for socket in node.inputs:
-        if socket.name in SKIPPED_SOCKETS:
-            continue
-        if socket.name in DIRECTIONS:
-            sockets[socket.name] = Socket(plain_value(socket), source_of(socket) is not None)
+        if socket.name in (*SKIPPED_SOCKETS, *DIRECTIONS):
             continue
         sockets[socket.name] = read_value(socket.name, Place(socket, ()), material.name, False, findings)
     found = Material(material.name, "principled", sockets, node.distribution, walks_of(node))
     found.transparent_shadows = material.use_transparent_shadow
-    _note_directions(found, node, findings)
-    return found
+    return replace(found, sockets=found.sockets | _directions(material, node, findings))
 
 
-def _note_directions(material: Material, node: bpy.types.Node, findings: Findings) -> None:
-    """Name directions that the fit does not have; without a link Blender's tangent circles the object's Z axis."""
-    turns = material.value("Anisotropic", 0.0) != 0.0
+def _directions(material: bpy.types.Material, node: bpy.types.Node, findings: Findings) -> dict[str, Socket]:
+    """The directions of a shader, of which the mesh may hold the tangent; others that are linked are named."""
+    by_mesh = bool(turned_axis(material))
+    found = {}
     for socket in (node.inputs[name] for name in DIRECTIONS if name in node.inputs):
         source, is_tangent = source_of(socket), socket.name == "Tangent"
-        if source is not None and not (is_tangent and is_uv_tangent(source.node)):
-            findings.note(f"Material '{material.name}': what is linked to {socket.name} is left out.")
-        elif source is None and is_tangent and turns:
-            findings.note(
-                f"Material '{material.name}': Tangent has no link, so that Cycles turns the anisotropy about the "
-                "object's Z axis, and the fit along the UV map: link a Tangent node of direction UV Map."
-            )
+        found[socket.name] = Socket(plain_value(socket), source is not None, by_mesh=is_tangent and by_mesh)
+        if source is None or (is_tangent and (by_mesh or is_uv_tangent(source.node) or not turns_highlights(node))):
+            continue
+        findings.note(f"Material '{material.name}': what is linked to {socket.name} is left out.")
+    return found

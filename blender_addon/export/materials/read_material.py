@@ -246,14 +246,23 @@ def _read_fitted(material: bpy.types.Material, target: TargetShader, findings: F
 
 
 def with_default_tangent(material: Material, *, is_fitted: bool = False) -> Material:
-    """The target's leaf, whose Tangent Cycles evaluates where it has no link and highlights turn along it.
+    """The target's leaf, whose Tangent circles the object's Z axis where it has no link and highlights turn along it.
 
-    That circles the object's Z axis. `is_fitted` says that a fit changes the anisotropy, which may be zero yet.
+    The mesh holds it, or Cycles evaluates it. `is_fitted` says that a fit changes the anisotropy, which may be zero.
     """
     tangent, amount = (material.sockets.get(name) for name in ("Tangent", "Anisotropic"))
     if tangent is None or tangent.linked or amount is None or not (is_fitted or amount.varies or amount.value):
         return material
-    return replace(material, sockets=material.sockets | {"Tangent": replace(tangent, by_graph=True, linked=True)})
+    given = replace(tangent, by_graph=not material.circling, by_mesh=material.circling, linked=True)
+    return replace(material, sockets=material.sockets | {"Tangent": given})
+
+
+def with_circling_tangents(material: Material) -> Material:
+    """The target's material, whose tangents circle an axis of its object: meshes hold them, and no graph does."""
+    tangent = material.sockets.get("Tangent")
+    given = {"Tangent": replace(tangent, by_graph=False, by_mesh=True)} if tangent and tangent.by_graph else {}
+    leaves = tuple(map(with_circling_tangents, material.leaves))
+    return replace(material, sockets=material.sockets | given, leaves=leaves, circling=True)
 
 
 def _read_direction(name: str, place: Place, material: str, findings: Findings) -> Socket:

@@ -20,7 +20,8 @@ _FACTOR = np.uint64(0x9E3779B97F4A7C15)  # odd, near 2**64 over the golden ratio
 class CornerMesh:
     """One triangulated mesh in its own space: three corners a triangle and the material slot of each triangle.
 
-    Corners of one vertex need not be the same: `vertices` says where to look for equal ones first.
+    Corners of one vertex need not be the same: `vertices` says where to look for equal ones first. `tangents` circle an
+    axis, see `circling_tangents`.
     """
 
     positions: NDArray[np.float32]  # (triangles, 3, 3)
@@ -28,6 +29,7 @@ class CornerMesh:
     uvs: NDArray[np.float32]  # (triangles, 3, 2)
     slots: NDArray[np.int32]  # (triangles,)
     vertices: NDArray[np.int32]  # (triangles, 3), each at least 0
+    tangents: NDArray[np.float32] | None = None  # (triangles, 3, 3)
 
 
 def same_mesh(first: CornerMesh, second: CornerMesh) -> bool:
@@ -72,9 +74,9 @@ class Piece:
 def world_mesh(mesh: CornerMesh, slots: NDArray[np.bool_], matrix: NDArray[np.float64]) -> TriangleMesh:
     """Return the triangles selected by `slots` (triangles,) moved by the 4x4 `matrix`, equal corners shared.
 
-    Triangles with a corner at NaN or farther than FARTHEST are left out. Normals move with the inverse
-    transpose. A mirroring matrix turns the winding around, so that the side a normal points to stays the outside, as in
-    Cycles.
+    Triangles with a corner at NaN or farther than FARTHEST are left out. Normals, and tangents as in Cycles, move with
+    the inverse transpose. A mirroring matrix turns the winding around, so that the side a normal points to stays the
+    outside, as in Cycles.
     """
     # sharing comes first: the corners are six times as many as the vertices of a smooth mesh
     rows, index = _shared_corners(mesh, slots)
@@ -97,8 +99,9 @@ def world_mesh(mesh: CornerMesh, slots: NDArray[np.bool_], matrix: NDArray[np.fl
     without = ~(lengths > 1e-20)  # True for NaN
     normals = np.where(without[:, None], 0.0, normals) / np.where(without, 1.0, lengths)[:, None]
     # Mitsuba counts the rows of a picture from the top, Blender's v from the bottom
-    uvs = np.nan_to_num(rows[:, 6:], posinf=0.0, neginf=0.0) * (1.0, -1.0) + (0.0, 1.0)
-    rows = np.concatenate([positions, normals, uvs], axis=1).astype(np.float32)
+    uvs = np.nan_to_num(rows[:, 6:8], posinf=0.0, neginf=0.0) * (1.0, -1.0) + (0.0, 1.0)
+    tangents = [] if mesh.tangents is None else [_at_most_unit(rows[:, 8:].astype(np.float64) @ cofactor.T)]
+    rows = np.concatenate([positions, normals, uvs, *tangents], axis=1).astype(np.float32)
     if without.any():  # such a corner takes the normal of its triangle
         rows, without = rows[index], without[index]
         rows[without, 3:6] = _face_normals(positions[index].reshape(-1, 3, 3), mirrored)[without]
@@ -109,9 +112,31 @@ def world_mesh(mesh: CornerMesh, slots: NDArray[np.bool_], matrix: NDArray[np.fl
     return TriangleMesh(
         np.ascontiguousarray(rows[:, :3]),
         np.ascontiguousarray(rows[:, 3:6]),
-        np.ascontiguousarray(rows[:, 6:]),
+        np.ascontiguousarray(rows[:, 6:8]),
         np.ascontiguousarray(triangles),
+        None if mesh.tangents is None else np.ascontiguousarray(rows[:, 8:]),
     )
+
+
+def _at_most_unit(vectors: NDArray[np.float64]) -> NDArray[np.float64]:
+    """All vectors (n, 3) by one factor, the longest at unit length; zero where they are not finite."""
+    vectors = np.nan_to_num(vectors, posinf=0.0, neginf=0.0)
+    return vectors / max(float(np.linalg.norm(vectors, axis=1).max(initial=0.0)), 1e-30)
+
+
+def circling_tangents(
+    positions: NDArray[np.float32], middle: NDArray[np.float64], size: NDArray[np.float64], axis: str
+) -> NDArray[np.float32]:
+    """The tangents (..., 3) by which Cycles turns highlights about an axis, X, Y or Z, of a mesh, in its space.
+
+    They come from Generated coordinates: positions (..., 3) in a box about `middle`, of half its `size` on each side.
+    Cycles moves them as normals and takes the part in the surface (`svm_node_tangent`, kernel/svm/tex_coord.h).
+    """
+    half = np.divide(0.5, size, out=np.zeros(3), where=size != 0.0)
+    x, y, z = np.moveaxis((positions - middle) * half, -1, 0)
+    nothing = np.zeros_like(x)
+    found = {"X": (nothing, -z, y), "Y": (-z, nothing, x), "Z": (-y, x, nothing)}[axis]
+    return np.stack(found, axis=-1).astype(np.float32)
 
 
 def joined(meshes: Sequence[TriangleMesh]) -> TriangleMesh:
@@ -119,17 +144,20 @@ def joined(meshes: Sequence[TriangleMesh]) -> TriangleMesh:
     if len(meshes) == 1:
         return meshes[0]
     starts = np.cumsum([0, *(len(mesh.positions) for mesh in meshes[:-1])])
+    tangents = [mesh.tangents for mesh in meshes if mesh.tangents is not None]
     return TriangleMesh(
         np.concatenate([mesh.positions for mesh in meshes]),
         np.concatenate([mesh.normals for mesh in meshes]),
         np.concatenate([mesh.uvs for mesh in meshes]),
         np.concatenate([mesh.triangles + start for mesh, start in zip(meshes, starts, strict=True)]).astype(np.int32),
+        np.concatenate(tangents) if len(tangents) == len(meshes) else None,
     )
 
 
 def _shared_corners(mesh: CornerMesh, faces: NDArray[np.bool_]) -> tuple[NDArray[np.float32], NDArray[np.int64]]:
     """`_shared` of the corners of these faces as rows, of which those like another of their vertex are left out."""
-    parts = [part if faces.all() else part[faces] for part in (mesh.positions, mesh.normals, mesh.uvs)]
+    parts = [mesh.positions, mesh.normals, mesh.uvs, *([] if mesh.tangents is None else [mesh.tangents])]
+    parts = [part if faces.all() else part[faces] for part in parts]
     parts = [part.reshape(-1, part.shape[-1]) for part in parts]
     vertices = mesh.vertices[faces].reshape(-1)
     own = np.arange(len(vertices))
@@ -146,10 +174,10 @@ def _shared_corners(mesh: CornerMesh, faces: NDArray[np.bool_]) -> tuple[NDArray
 
 
 def _shared(rows: NDArray[np.float32]) -> tuple[NDArray[np.float32], NDArray[np.int64]]:
-    """Return the distinct rows of `rows` (n, 8) and the index of each row among them."""
+    """Return the distinct rows of `rows` (n, 8 or 11) and the index of each row among them."""
     rows = rows + np.float32(0.0)  # -0.0 and 0.0 are one
     # sorting 64-bit hashes takes a tenth of the time of sorting rows; two numbers at a time are one of 64 bits
-    pairs = rows.view(np.uint64)
+    pairs = (rows if rows.shape[1] % 2 == 0 else np.pad(rows, ((0, 0), (0, 1)))).view(np.uint64)
     hashes = np.zeros(len(rows), np.uint64)
     for column in range(pairs.shape[1]):
         hashes = (hashes ^ pairs[:, column]) * _FACTOR

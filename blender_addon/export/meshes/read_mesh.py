@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import TypeVar
 
 import bpy
@@ -10,24 +11,29 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...versions import corner_normals, rounds_beside_flat_faces
-from .mesh_arrays import CornerMesh
+from .mesh_arrays import CornerMesh, circling_tangents
 
 MESH_TYPES = ("MESH", "CURVE", "SURFACE", "FONT", "META")  # of objects whose faces are rendered
 Number = TypeVar("Number", np.int32, np.bool_)
 
 
-def read_mesh(evaluated: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> CornerMesh | None:
-    """Return the triangles of an evaluated object in its own space, or None if it has no faces."""
+def read_mesh(
+    evaluated: bpy.types.Object, depsgraph: bpy.types.Depsgraph, axes: Sequence[str] = ()
+) -> CornerMesh | None:
+    """Return the triangles of an evaluated object in its own space, or None if it has no faces.
+
+    Faces of a slot for which `axes` has one, X, Y or Z, have tangents that circle it.
+    """
     # the data of an instance is what geometry nodes have made; of a mesh that is edited it is not complete, also where
     # another object edits it
     if isinstance(evaluated.data, bpy.types.Mesh) and not evaluated.data.is_editmode:
-        return _corner_mesh(evaluated.data) if len(evaluated.data.polygons) else None
+        return _corner_mesh(evaluated.data, axes) if len(evaluated.data.polygons) else None
     try:
         mesh = evaluated.to_mesh(preserve_all_data_layers=False, depsgraph=depsgraph)
     except RuntimeError:  # this type has no geometry that converts
         return None
     try:
-        return _corner_mesh(mesh) if mesh is not None and len(mesh.polygons) else None
+        return _corner_mesh(mesh, axes) if mesh is not None and len(mesh.polygons) else None
     finally:
         evaluated.to_mesh_clear()
 
@@ -51,19 +57,34 @@ def slot_count(evaluated: bpy.types.Object) -> int:
     return max(len(evaluated.material_slots), len(getattr(evaluated.data, "materials", ())))
 
 
-def _corner_mesh(mesh: bpy.types.Mesh) -> CornerMesh:
+def _corner_mesh(mesh: bpy.types.Mesh, axes: Sequence[str]) -> CornerMesh:
     places, corners, is_smooth = corners_of(mesh)
     uvs = np.zeros(len(mesh.loops) * 2, dtype=np.float32)
     layer = next((layer for layer in mesh.uv_layers if layer.active_render), None)
     if layer is not None:
         layer.uv.foreach_get("vector", uvs)
+    slots = _of_faces(mesh, "material_index", np.int32)[_faces(mesh)]
     return CornerMesh(
         positions=places,
         normals=_shading_normals(mesh, places, corners, is_smooth),
         uvs=uvs.reshape(-1, 2)[corners].reshape(-1, 3, 2),
-        slots=_of_faces(mesh, "material_index", np.int32)[_faces(mesh)],
+        slots=slots,
         vertices=_vertex_of_corner(mesh)[corners].reshape(-1, 3),
+        tangents=_tangents(mesh, places, slots, axes) if any(axes) else None,
     )
+
+
+def _tangents(
+    mesh: bpy.types.Mesh, places: NDArray[np.float32], slots: NDArray[np.int32], axes: Sequence[str]
+) -> NDArray[np.float32]:
+    """Tangents (triangles, 3, 3) of a mesh that no modifier deforms; zero for other slots."""
+    middle, size = (np.array(each, np.float64) for each in (mesh.texspace_location, mesh.texspace_size))
+    found = np.zeros_like(places)
+    slots = np.clip(slots, 0, len(axes) - 1)
+    for slot, axis in enumerate(axes):
+        if axis:
+            found[slots == slot] = circling_tangents(places[slots == slot], middle, size, axis)
+    return found
 
 
 def corners_of(mesh: bpy.types.Mesh) -> tuple[NDArray[np.float32], NDArray[np.int32], NDArray[np.bool_]]:

@@ -26,12 +26,14 @@ from ..lights.read_light import linked_light, note_linking, read_light
 from ..material_model import Material, grey
 from ..materials.baked_material import refuse_dark
 from ..materials.read_context import needs_bake, read_context
-from ..materials.read_material import name_material_settings, read_target
+from ..materials.read_material import name_material_settings, read_target, with_circling_tangents
 from ..materials.unfinite_pixels import refuse_unfinite_pixels
+from ..meshes.circled_axes import CircledAxes
 from ..meshes.face_notes import APART, MANY, note_coincident_faces, note_coplanar_faces
 from ..meshes.known_meshes import KnownMeshes
 from ..meshes.mesh_arrays import CornerMesh, Piece, joined
 from ..meshes.read_mesh import MESH_TYPES, material_of_slot, read_mesh, slot_count
+from ..nodes.circling import circled_axis, keeps_place
 from ..nodes.dependence import deformed_generated
 from ..nodes.displacement import moves_faces
 from ..render_state import (
@@ -131,7 +133,10 @@ def _read(
         materials = []
         for each in fitted:
             of_one = Findings(findings.of_mitsuba) if targets else findings
-            materials.append(read_target(each.material, each.object.name, each.slot, of_one, each.leaf))
+            found = read_target(each.material, each.object.name, each.slot, of_one, each.leaf)
+            if found is not None and circled_axis(each.material) and keeps_place(each.object):
+                found = with_circling_tangents(found)
+            materials.append(found)
             if targets:
                 findings.take_over(of_one, (each.object.name, each.slot))
         described = [material for material in materials if material is not None]
@@ -214,10 +219,13 @@ class _Walk:
         self.seen: dict[str, NDArray[np.float64]] = {}  # points of what the camera sees
         data.target_count = len(targets)
         self.bsdfs: dict[str, str] = {}
+        axes: dict[str, str] = {}
         for number, (each, material) in enumerate(zip(targets, materials, strict=True)):
             data.materials[target_bsdf(number)] = material
             assert each.material is not None  # it was read
             self.bsdfs[each.material.name_full] = target_bsdf(number)
+            axes[each.material.name_full] = circled_axis(each.material) if material.circling else ""
+        self.axes = CircledAxes(axes, findings)
 
     def run(self) -> None:
         """Read all that there is; the shapes of the scene have no triangles until they are placed."""
@@ -295,7 +303,7 @@ class _Walk:
         item = instance.object
         key = (item.name_full, item.data.as_pointer())
         if key not in self.meshes:
-            mesh = read_mesh(item, self.depsgraph)
+            mesh = read_mesh(item, self.depsgraph, self.axes.of(item))
             self.meshes[key] = mesh = None if mesh is None else self.known.mesh(item.name_full, mesh)
             displaces = any(moves_faces(material_of_slot(item, slot)) for slot in range(slot_count(item)))
             if mesh is not None and displaces and self.bakes is not None:

@@ -34,6 +34,7 @@ from ..materials.read_context import read_context
 from ..materials.read_material import volume_sockets
 from ..meshes.mesh_arrays import Piece
 from ..meshes.read_mesh import material_of_slot
+from ..nodes.circling import turned_axis
 from ..nodes.dependence import (
     OF_INSTANCER_COLOR,
     OF_SIZE,
@@ -214,7 +215,8 @@ class SceneBakes:
             try:
                 if found[index]["status"] != "ok":
                     raise BakeError(found[index]["sentence"])
-                self._put_surface(data, findings, identifier, asked, Baked(found[index], folder / str(index)))
+                baked = Baked(found[index], folder / str(index), circles=bool(turned_axis(asked.material)))
+                self._put_surface(data, findings, identifier, asked, baked)
             except BakeError as problem:
                 _give_up(data, identifier, asked.material, asked.owner, problem, findings)
 

@@ -20,6 +20,7 @@ _MATERIAL_KEYS = (
     *_NORMAL_KEYS,
 )
 _FILES = ("texture", "graph", "elsewhere")  # of a socket
+_FLAGS = ("turned", "mesh")
 
 
 @dataclass(frozen=True)
@@ -27,7 +28,8 @@ class Socket:
     """A socket of a Blender Principled node; a linked one stays as it is.
 
     Files of the job: a `texture` over the UV map, a `graph` as the camera sees it, and `elsewhere` for other rays. A
-    normal that is `turned` has the opposite direction on the surface's other side, and is mirrored there if not.
+    normal that is `turned` has the opposite direction on the surface's other side, and is mirrored there if not. A
+    Tangent with `mesh` is the vertex attribute `tangent` of the meshes.
     """
 
     value: Any = None
@@ -36,6 +38,7 @@ class Socket:
     graph: str | None = None
     elsewhere: str | None = None
     turned: bool = False
+    mesh: bool = False
 
 
 @dataclass(frozen=True)
@@ -123,23 +126,22 @@ def _shader(data: Any, where: str, shaders: Sequence[str]) -> Material:
 
 
 def _socket(data: Any, where: str) -> Socket:
-    socket = CheckedObject(data, where, ("value", "linked", "turned", *_FILES))
+    socket = CheckedObject(data, where, ("value", "linked", *_FLAGS, *_FILES))
     value = socket.raw("value", None)
     numbers = value if isinstance(value, list) else [value]
     if not (value is None or isinstance(value, bool) or (1 <= len(numbers) <= 4 and all(map(is_number, numbers)))):
         raise socket.wrong("value", "a number, a list of one to four, true, false or null")
     files = {key: socket.text(key) for key in _FILES if socket.raw(key, None) is not None}
-    return Socket(value, socket.boolean("linked", False), turned=socket.boolean("turned", False), **files)
+    linked, turned, mesh = (socket.boolean(key, False) for key in ("linked", *_FLAGS))
+    return Socket(value, linked, turned=turned, mesh=mesh, **files)
 
 
 def without_nothing(material: dict[str, Any]) -> None:
     """Leave out files that are not there."""
     for socket in (*material["sockets"].values(), material["weight"]):
-        for key in _FILES:
-            if socket[key] is None:
+        for key in (*_FILES, *_FLAGS):
+            if not socket[key]:
                 del socket[key]
-        if not socket["turned"]:
-            del socket["turned"]
     for key in (*_NORMAL_KEYS, *MIX_KEYS):
         if not material[key]:
             del material[key]

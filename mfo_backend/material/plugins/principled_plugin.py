@@ -44,11 +44,13 @@ from ..principled.needed_lobes import Lobes, needed_lobes
 from ..principled.principled_parameters import BLENDER_PRINCIPLED
 from ..principled.random_walk import Below
 from .own_normal import own_normal
+from .projective_texture import ProjectiveTexture
 from .surface_layers import SurfaceLayers
 
 PLUGIN_NAME = "blender_principled"
 DIRECTIONS = ("shading_normal", "normal", "coat_normal", "tangent")
-GIVEN = 0.1  # length of a direction above which there is one
+GIVEN = 0.1  # length of a direction above which there is one in a picture, where it may be a mean
+GIVEN_BY_MESH = 1e-6  # the same of a mesh's tangents, which get shorter towards the axis that they circle
 
 
 class BlenderPrincipled(mi.BSDF):
@@ -236,8 +238,11 @@ class BlenderPrincipled(mi.BSDF):
         coat = valid_normal(geometric, view, self._turned_to_view("coat_normal", si, smooth, active))
         along: Any = mi.Vector3f(si.sh_frame.s)
         if "tangent" in self.directions:
-            given = mi.Vector3f(self.directions["tangent"].eval(si, active))
-            along = dr.select(dr.norm(given) > GIVEN, dr.normalize(given), along)
+            texture = self.directions["tangent"]
+            least = GIVEN if isinstance(texture, ProjectiveTexture) else GIVEN_BY_MESH
+            given = mi.Vector3f(texture.eval(si, active))
+            given -= dr.dot(given, smooth) * smooth  # Cycles' Tangent node has it in the smooth surface
+            along = dr.select(dr.norm(given) > least, dr.normalize(given), along)
         facets = valid_normal(geometric, view, bumped)
         return {
             "normal": facets, "smooth_normal": smooth, "bumped_normal": bumped, "coat_normal": coat, "tangent": along,

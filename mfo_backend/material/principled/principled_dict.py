@@ -10,6 +10,7 @@ from ...types.errors import BadInputError
 from ...types.parameter import Value
 from .principled_parameters import BLENDER_PRINCIPLED, PARAMETER_OF_SOCKET
 
+MESH_TANGENT = "vertex_tangent"  # the attribute of a mesh that holds the directions of a `Tangent` with `mesh`
 # Sockets without effect here: normals and tangents are the mesh's
 _IGNORED = {"Weight", "Thin Wall"}
 _EMISSION = {"Emission Color": [1.0, 1.0, 1.0], "Emission Strength": 0.0}
@@ -35,8 +36,8 @@ def blender_principled_dict(
     """Properties for `mi.load_dict` from `{"Base Color": {"value": [r, g, b]}, ...}`, colours linear Rec.709.
 
     A socket with a `texture` becomes a nested bitmap read without colour conversion, one with a `graph` a texture that
-    is projected from the camera (`projective_texture`). Sockets at their default are left out unless `free`, so that
-    their lobes stay out of the kernel.
+    is projected from the camera (`projective_texture`), and a Tangent with `mesh` the mesh's `MESH_TANGENT`. Sockets at
+    their default are left out unless `free`, so that their lobes stay out of the kernel.
 
     Raises
     ------
@@ -57,6 +58,8 @@ def blender_principled_dict(
     for socket, content in sockets.items():
         if socket in DIRECTIONS and content.get("graph"):
             result[DIRECTIONS[socket]] = projective(content, [0.0, 0.0, 0.0])
+        if socket == "Tangent" and content.get("mesh"):
+            result[DIRECTIONS[socket]] = {"type": "mesh_attribute", "name": MESH_TANGENT}
         if socket in _IGNORED or socket in DIRECTIONS:
             continue
         if socket not in PARAMETER_OF_SOCKET:

@@ -255,6 +255,9 @@ def _rewrite(bsdf: Element, properties: Mapping[str, Any], textures: Mapping[str
             _rewrite(ElementTree.SubElement(bsdf, "bsdf", name=name), value, textures)
         elif isinstance(value, Mapping) and value["type"] == "projective":
             bsdf.append(_projective(name, value))
+        elif isinstance(value, Mapping) and value["type"] == "mesh_attribute":
+            texture = ElementTree.SubElement(bsdf, "texture", type="mesh_attribute", name=name)
+            ElementTree.SubElement(texture, "string", name="name", value=value["name"])
         elif isinstance(value, Mapping) and value["type"] == "rgb":
             ElementTree.SubElement(bsdf, "rgb", name=name, value=", ".join(map(repr, value["value"])))
         elif isinstance(value, Mapping):

@@ -324,7 +324,25 @@ def _loaded(document: Element, scene_xml: Path, light_paths: LightPaths | None) 
             raise BadInputError(f"Mitsuba cannot load {scene_xml.name}: {' '.join(str(error).split())}") from None
     if not scene.emitters():
         raise BadInputError(f"{scene_xml.name} has no light: add a light or a world.")
+    _check_attributes(document, scene)
     return scene, light_paths
+
+
+def _check_attributes(document: Element, scene: Any) -> None:
+    """Refuse a mesh without the attribute that its material asks for, which would end its first picture."""
+    asked = {
+        bsdf.get("id"): texture.find("string[@name='name']")
+        for bsdf in document.findall("bsdf")
+        for texture in bsdf.iter("texture")
+        if texture.get("type") == "mesh_attribute"
+    }
+    for shape in scene.shapes():
+        name = asked.get(shape.bsdf().id())
+        if name is not None and not shape.has_attribute(name.get("value", "")):
+            raise BadInputError(
+                f"The mesh of shape {shape.id()!r} has no attribute {name.get('value')!r}, which its material asks "
+                "for: export the scene again."
+            )
 
 
 def _camera_world(document: Element) -> Element | None:
