@@ -186,7 +186,9 @@ def sincos(x: Any) -> tuple[Any, Any]:
 
 
 def select(mask: Any, yes: Any, no: Any) -> Any:
-    """`drjit.select`."""
+    """`drjit.select`; a number that both sides are stays one, to which a dual number can be added."""
+    if isinstance(yes, (int, float)) and isinstance(no, (int, float)) and yes == no:
+        return yes
     value = drjit.select(mask, value_of(yes), value_of(no))
     if not (isinstance(yes, Dual) or isinstance(no, Dual)):
         return value
