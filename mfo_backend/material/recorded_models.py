@@ -92,6 +92,8 @@ class BlenderPrincipledModel:
 
     def values(self, given: Mapping[str, Value | None], free: Collection[str]) -> dict[str, Value | None]:
         """See `RecordedModel`."""
+        if self._cycles.shader == "translucent":
+            raise UnrecordableError("The material is translucent and recorded paths hold reflected light only.")
         for name, opaque in (("transmission_weight", 0.0), ("alpha", 1.0)):
             if name in free or given.get(name, opaque) != opaque:
                 raise UnrecordableError(f"The material has {name!r} and recorded paths hold reflected light only.")

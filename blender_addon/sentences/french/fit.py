@@ -106,6 +106,7 @@ FIT = {
     "So whole light paths were traced, by the stages {}.": "Donc des chemins de lumière entiers ont été tracés, par les étapes {}.",
     "No start of the fit gives finite numbers on the recorded light paths.": "Aucun départ de l'ajustement ne donne des nombres finis sur les chemins de lumière enregistrés.",
     "The material has {} and recorded paths hold reflected light only.": "Le matériau a {} et les chemins enregistrés ne contiennent que de la lumière réfléchie.",
+    "The material is translucent and recorded paths hold reflected light only.": "Le matériau est translucide et les chemins enregistrés ne contiennent que de la lumière réfléchie.",
     "The target emits light and the integrator hides what does.": "L'objet émet de la lumière et l'intégrateur cache ce qui en émet.",
     "The material is mixed with one that lets light through.": "Le matériau est mélangé à un autre qui laisse passer la lumière.",
     "Several shaders of a mix, or its factors, are fitted on opaque surfaces alone.": "Plusieurs shaders d'un mélange, ou ses facteurs, ne sont ajustés que sur des surfaces opaques.",

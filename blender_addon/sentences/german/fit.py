@@ -106,6 +106,7 @@ FIT = {
     "So whole light paths were traced, by the stages {}.": "Also wurden ganze Lichtpfade verfolgt, in den Stufen {}.",
     "No start of the fit gives finite numbers on the recorded light paths.": "Kein Anfang der Anpassung gibt endliche Zahlen auf den aufgezeichneten Lichtpfaden.",
     "The material has {} and recorded paths hold reflected light only.": "Das Material hat {}, und aufgezeichnete Pfade enthalten nur zurückgeworfenes Licht.",
+    "The material is translucent and recorded paths hold reflected light only.": "Das Material ist lichtdurchlässig (Translucent), und aufgezeichnete Pfade enthalten nur zurückgeworfenes Licht.",
     "The target emits light and the integrator hides what does.": "Das Objekt leuchtet, und der Integrator verbirgt, was leuchtet.",
     "The material is mixed with one that lets light through.": "Das Material ist mit einem gemischt, das Licht durchlässt.",
     "Several shaders of a mix, or its factors, are fitted on opaque surfaces alone.": "Mehrere Shader einer Mischung, oder ihre Faktoren, werden nur auf undurchsichtigen Oberflächen angepasst.",

@@ -44,8 +44,8 @@ def loaded(folder, lights, sockets, shader="principled", shape=""):
     )  # fmt: skip
 
 
-def error_of(renderer, truth):
-    """How far the fit of a picture of these values ends from it, root mean square, as a share of it."""
+def fitted(renderer, truth):
+    """How far the fit of a picture of these values ends from it, root mean square, as a share of it; its notes."""
     reference, mask = renderer.image(truth, seed=5, spp=512), renderer.target_mask()
     outcome = recover_material(
         renderer, Image(reference, Encoding.LINEAR), FitSettings(preset="fast"),
@@ -53,7 +53,8 @@ def error_of(renderer, truth):
     )  # fmt: skip
     assert outcome.result.status is Status.CONVERGED
     found = renderer.image(renderer.table.pack(outcome.result.recovered), seed=5, spp=512)
-    return np.sqrt(np.mean((found - reference)[mask] ** 2) / np.mean(reference[mask] ** 2))
+    error = np.sqrt(np.mean((found - reference)[mask] ** 2) / np.mean(reference[mask] ** 2))
+    return error, outcome.result.notes
 
 
 # the sky is nearly the same from all sides, and the target fills nine tiles: materials are hardly told apart
@@ -63,7 +64,7 @@ def test_a_fit_of_each_lobe_ends_at_its_picture(tmp_path, name, lights, most):
     sockets = {parameter_to_socket(key): value for key, value in OPAQUE[name].items()}
     renderer = loaded(tmp_path, lights, sockets | {"Base Color": GREY, "Roughness": 0.6})
     truth = renderer.table.pack(renderer.table.unpack(renderer.start) | OPAQUE[name])
-    assert error_of(renderer, truth) < most
+    assert fitted(renderer, truth)[0] < most
 
 
 @pytest.mark.parametrize("shape", ["", LEANING], ids=["plain", "leaning"])
@@ -73,4 +74,7 @@ def test_a_fit_of_each_shader_alone_ends_at_its_picture(tmp_path, name, shape):
     renderer = loaded(tmp_path, SKY + POINT, {"Base Color": GREY, **sockets}, shader, shape)
     color = "sheen_tint" if name in ("sheen", "toon") else "base_color"
     truth = renderer.table.with_values(renderer.start, **{color: np.array([0.7, 0.3, 0.2])})
-    assert error_of(renderer, truth) < 0.2
+    error, notes = fitted(renderer, truth)
+    assert error < 0.2
+    traced = any("whole light paths were traced" in note for note in notes)
+    assert traced == (name in ("glass", "refraction", "translucent"))  # what light passes
