@@ -27,6 +27,7 @@ from ..nodes.graph_findings import graph_problem
 from ..nodes.leaf_kinds import KINDS
 from ..nodes.shader_graph import plain_value
 from ..nodes.target_shader import DIRECTIONS, TargetShader, fits_all_leaves, target_shader
+from ..nodes.volumes import lets_light_in
 
 COPY = "scene.blend"  # of the file, in the folder of the graph's pictures: the backend has it evaluated
 OPAQUE = {"Alpha": 1.0, "Transmission Weight": 0.0}  # what a fit on recorded light asks of a material
@@ -94,6 +95,8 @@ def _not_fitted(target: TargetShader, fit: dict[str, Any]) -> str | None:
         socket = target.sockets.get(name)
         if socket is not None and (socket.is_linked or plain_value(socket) != opaque):
             return f"a fit of them needs an opaque material, and {name} is {'linked' if socket.is_linked else 'set'}"
+    if lets_light_in(target.leaf):
+        return f"a fit of them needs an opaque material, and '{target.name}' lets light through"
     return None
 
 

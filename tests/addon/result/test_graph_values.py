@@ -269,6 +269,25 @@ def test_what_a_fit_is_refused(graph: SimpleNamespace, tmp_path: Path) -> None:
     assert not (tmp_path / "job").exists()
 
 
+@pytest.mark.parametrize("kind", ["Glass", "Refraction", "Translucent"])
+def test_values_inside_nodes_of_what_lets_light_through_stay(graph: SimpleNamespace, tmp_path: Path, kind: str) -> None:
+    """Its own values are fitted, and the rest is said; all together was refused by the backend's sentence."""
+    from blender_addon.export.job import ExportError, export_job
+
+    tree = graph.material.node_tree
+    alone = tree.nodes.new(f"ShaderNodeBsdf{kind}")
+    tree.links.new(graph.shader.inputs["Base Color"].links[0].from_socket, alone.inputs["Color"])
+    tree.links.new(alone.outputs[0], tree.get_output_node("CYCLES").inputs["Surface"])
+    target = graph.bpy.data.objects["Väse"]
+    if kind == "Translucent":  # which has nothing else
+        with pytest.raises(ExportError, match="none of them is left to fit: choose one that has no link"):
+            export_job(graph.bpy.context, target, tmp_path / "job", reference=None, fit={})
+        return
+    report = export_job(graph.bpy.context, target, tmp_path / "job", reference=None, fit={})
+    said = f"stay as they are: a fit of them needs an opaque material, and '{kind} BSDF' lets light through."
+    assert any(note.endswith(said) for note in report.notes)
+
+
 def test_a_picture_is_tinted_by_a_node_that_apply_puts_there(graph: SimpleNamespace, tmp_path: Path) -> None:
     from blender_addon.graph_values.place import read
     from blender_addon.probe.value_pictures import answer
