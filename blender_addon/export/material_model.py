@@ -63,8 +63,8 @@ class Material:
     A mix and a bumped surface have `parts`, and of sockets those of emission alone. `normal` (height, width, 3) has
     normals in the frame of the UV map, n / 2 + 1 / 2; where it is `displaced` these take the place of the mesh's
     smooth ones, as a displacement by bump does, and where `turned` they have the opposite direction on the other side
-    of the surface, as those of a socket. Without `transparent_shadows` no light passes into a shadow. Tangents that are
-    `circling` an axis of the object are in its meshes.
+    of the surface, as those of a socket. Without `transparent_shadows` no light passes into a shadow. Tangents
+    that circle an axis of the object, X, Y or Z in `circling`, are in its meshes.
     `shader` is the backend's word for lobes that are not all of a Principled BSDF.
 
     The target may be one leaf of a mix: `weight` is its share, and `leaves` are the others with theirs. `node` is the
@@ -85,7 +85,7 @@ class Material:
     displaced: bool = False
     turned: bool = False
     transparent_shadows: bool = True
-    circling: bool = False
+    circling: str = ""
     shader: str = "principled"
     weight: Socket = Socket(1.0)
     leaves: tuple[Material, ...] = ()

@@ -24,13 +24,12 @@ from ..fitted_slot import FittedSlot
 from ..material_model import Material
 from ..nodes.displacement import SHADING_NORMAL
 from ..nodes.graph_findings import graph_problem
-from ..nodes.leaf_kinds import KINDS
+from ..nodes.leaf_kinds import KINDS, OPAQUE
 from ..nodes.shader_graph import plain_value
 from ..nodes.target_shader import DIRECTIONS, TargetShader, fits_all_leaves, target_shader
 from ..nodes.volumes import lets_light_in
 
 COPY = "scene.blend"  # of the file, in the folder of the graph's pictures: the backend has it evaluated
-OPAQUE = {"Alpha": 1.0, "Transmission Weight": 0.0}  # what a fit on recorded light asks of a material
 ON_RECORDED_LIGHT = ("fast", "balanced", "best")
 
 

@@ -253,16 +253,17 @@ def with_default_tangent(material: Material, *, is_fitted: bool = False) -> Mate
     tangent, amount = (material.sockets.get(name) for name in ("Tangent", "Anisotropic"))
     if tangent is None or tangent.linked or amount is None or not (is_fitted or amount.varies or amount.value):
         return material
-    given = replace(tangent, by_graph=not material.circling, by_mesh=material.circling, linked=True)
+    by_mesh = bool(material.circling)
+    given = replace(tangent, by_graph=not by_mesh, by_mesh=by_mesh, linked=True)
     return replace(material, sockets=material.sockets | {"Tangent": given})
 
 
-def with_circling_tangents(material: Material) -> Material:
+def with_circling_tangents(material: Material, axis: str) -> Material:
     """The target's material, whose tangents circle an axis of its object: meshes hold them, and no graph does."""
     tangent = material.sockets.get("Tangent")
     given = {"Tangent": replace(tangent, by_graph=False, by_mesh=True)} if tangent and tangent.by_graph else {}
-    leaves = tuple(map(with_circling_tangents, material.leaves))
-    return replace(material, sockets=material.sockets | given, leaves=leaves, circling=True)
+    leaves = tuple(with_circling_tangents(leaf, axis) for leaf in material.leaves)
+    return replace(material, sockets=material.sockets | given, leaves=leaves, circling=axis)
 
 
 def _read_direction(name: str, place: Place, material: str, findings: Findings) -> Socket:

@@ -29,7 +29,7 @@ class CircledAxes:
         if own.name_full not in self._known:
             self._known[own.name_full] = turned_axis(own)
         axis = self._known[own.name_full]
-        if axis and turned_axis(own) and not keeps_place(item):
+        if axis and not keeps_place(item) and turned_axis(own):
             self._findings.note(
                 f"Material '{own.name}' turns its highlights about an axis of '{item.name}': in the fit about that of "
                 "its faces as they are, in Cycles as they were before they were deformed."

@@ -61,18 +61,18 @@ DEFORMING = (
 
 def asked_for(tree: bpy.types.NodeTree, outputs: Outputs) -> list[str]:
     """Labels of nodes in `tree` and its groups that something asks for one of these outputs."""
-    return sorted({node.bl_label for node in nodes_within(tree) if _is_asked(node, outputs)})
+    return sorted({node.bl_label for node in _nodes(tree) if _is_asked(node, outputs)})
 
 
 def asked_of_place(tree: bpy.types.NodeTree) -> list[str]:
     """Labels of nodes that something asks for what each instance of an object has of its own."""
-    others = {node.bl_label for node in nodes_within(tree) if getattr(node, "object", None) is not None}
+    others = {node.bl_label for node in _nodes(tree) if getattr(node, "object", None) is not None}
     return sorted({*asked_for(tree, OF_PLACE), *others})
 
 
 def asked_of_instancer(tree: bpy.types.NodeTree) -> list[str]:
     """Labels of nodes that something asks for what particles, points or other instancers say of an instance."""
-    return sorted({node.bl_label for node in nodes_within(tree) if _asks_instancer(node)})
+    return sorted({node.bl_label for node in _nodes(tree) if _asks_instancer(node)})
 
 
 def asked_of_side(tree: bpy.types.NodeTree) -> list[str]:
@@ -80,7 +80,7 @@ def asked_of_side(tree: bpy.types.NodeTree) -> list[str]:
     kinds = ("ShaderNodeLightPath", *OF_SURROUNDINGS)
     others = {
         node.bl_label
-        for node in nodes_within(tree)
+        for node in _nodes(tree)
         if (node.bl_idname in kinds and any(output.is_linked for output in node.outputs))
         or getattr(node, "projection", "") == "BOX"
     }
@@ -89,10 +89,10 @@ def asked_of_side(tree: bpy.types.NodeTree) -> list[str]:
 
 def turns_with_camera(tree: bpy.types.NodeTree) -> list[str]:
     """Labels of nodes in a world's tree whose values depend on which way the camera looks."""
-    found = {node.bl_label for node in nodes_within(tree) if _is_asked(node, OF_CAMERA_TURN)}
+    found = {node.bl_label for node in _nodes(tree) if _is_asked(node, OF_CAMERA_TURN)}
     spaces = {
         node.bl_label
-        for node in nodes_within(tree)
+        for node in _nodes(tree)
         if node.bl_idname == "ShaderNodeVectorTransform" and "CAMERA" in (node.convert_from, node.convert_to)
     }
     return sorted(found | spaces)
@@ -100,7 +100,7 @@ def turns_with_camera(tree: bpy.types.NodeTree) -> list[str]:
 
 def deformed_generated(item: bpy.types.Object, tree: bpy.types.NodeTree) -> list[str]:
     """What deforms `item`, as `deforming`, where nodes of `tree` ask for Generated coordinates."""
-    return deforming(item) if any(_asks_generated(node) for node in nodes_within(tree)) else []
+    return deforming(item) if any(_asks_generated(node) for node in _nodes(tree)) else []
 
 
 def deforming(item: bpy.types.Object) -> list[str]:
@@ -112,11 +112,10 @@ def deforming(item: bpy.types.Object) -> list[str]:
     return found
 
 
-def nodes_within(tree: bpy.types.NodeTree) -> Iterator[bpy.types.Node]:
-    """The nodes of a tree and of groups in it, which are no nodes of their own here."""
+def _nodes(tree: bpy.types.NodeTree) -> Iterator[bpy.types.Node]:
     for node in tree.nodes:
         if node.bl_idname == "ShaderNodeGroup" and node.node_tree is not None:
-            yield from nodes_within(node.node_tree)
+            yield from _nodes(node.node_tree)
         else:
             yield node
 

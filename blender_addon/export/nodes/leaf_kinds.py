@@ -16,13 +16,13 @@ import bpy
 from ...versions import DIFFUSE, PRINCIPLED, has_diffuse_roughness
 
 # what of a Principled BSDF keeps it opaque, and what takes away its specular reflection
-_OPAQUE = {"Alpha": 1.0, "Transmission Weight": 0.0}
-WITHOUT_SPECULAR = {"Metallic": 0.0, "Roughness": 1.0, "IOR": 1.5, "Specular IOR Level": 0.0, **_OPAQUE}
+OPAQUE = {"Alpha": 1.0, "Transmission Weight": 0.0}  # of what no light gets through
+WITHOUT_SPECULAR = {"Metallic": 0.0, "Roughness": 1.0, "IOR": 1.5, "Specular IOR Level": 0.0, **OPAQUE}
 _GLASS = {"Metallic": 0.0, "Alpha": 1.0, "Transmission Weight": 1.0}
 _CLEAR = {"Base Color": "Color", "Roughness": "Roughness", "IOR": "IOR"}
 _FILM = {"Thin Film Thickness": "Thin Film Thickness", "Thin Film IOR": "Thin Film IOR"}
 _MATTE = {"Base Color": "Color"}
-_METAL = {"Metallic": 1.0, "IOR": 1.5, "Specular IOR Level": 0.5, **_OPAQUE}
+_METAL = {"Metallic": 1.0, "IOR": 1.5, "Specular IOR Level": 0.5, **OPAQUE}
 _SHEEN = {"Base Color": [0.0, 0.0, 0.0], "Sheen Weight": 1.0, **WITHOUT_SPECULAR}
 
 

@@ -17,14 +17,13 @@ import numpy as np
 
 from ...versions import PRINCIPLED, active_output, node_tree_of
 from .closure_leaves import ClosureError, ClosureLeaf, closure_leaves
-from .leaf_kinds import TRANSPARENT, sockets_of
+from .leaf_kinds import OPAQUE, TRANSPARENT, sockets_of
 from .shader_graph import plain_value, source_of
 
 DENSITY, COLOR = "Absorption Density", "Absorption Color"  # what a material's values are called
 ABSORPTION, PRINCIPLED_VOLUME = "ShaderNodeVolumeAbsorption", "ShaderNodeVolumePrincipled"
 COEFFICIENTS = "ShaderNodeVolumeCoefficients"  # of Blenders newer than 4.3
 _CLEAR = (TRANSPARENT, "ShaderNodeBsdfGlass", "ShaderNodeBsdfRefraction", "ShaderNodeBsdfTranslucent")
-_OPAQUE = {"Alpha": 1.0, "Transmission Weight": 0.0}
 _Values = dict[str, Any]
 
 
@@ -55,7 +54,7 @@ def lets_light_in(leaf: ClosureLeaf) -> bool:
     own = sockets_of(leaf.node)
     if leaf.node.bl_idname != PRINCIPLED:
         return leaf.node.bl_idname in _CLEAR
-    return any(source_of(own[name]) is not None or plain_value(own[name]) != opaque for name, opaque in _OPAQUE.items())
+    return any(source_of(own[name]) is not None or plain_value(own[name]) != opaque for name, opaque in OPAQUE.items())
 
 
 def absorbing_volume(material: bpy.types.Material | None) -> AbsorbingVolume | None:

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from ..findings import Findings
 from ..fitted_slot import FittedSlot
 from ..material_model import Material
-from .scene_data import SceneData, Shape
+from .scene_data import SceneData, Shape, target_shape
 
 # Metres. Mitsuba starts rays 9e-5 (1 + d) above a surface, d its distance from zero: a millimetre here. A ball of 1 m
 # on a floor was as in Cycles at 35 m, 0.07 % too dark at 117 m, 0.8 % at 1.2 km and 5.3 % at 5.8 km; moved, 0.03 %.
@@ -62,10 +62,10 @@ def moved(matrix: NDArray[np.float64], origin: NDArray[np.float64]) -> NDArray[n
 
 def note_wide_scattering(data: SceneData, findings: Findings) -> None:
     """Report materials with subsurface on shapes that are not large beside the way of light there."""
-    targets = [data.target_of(number) for number in range(data.target_count)]
+    targets = {target_shape(number) for number in range(data.target_count)}
     for shape in data.shapes:
         size = float(np.ptp(shape.mesh.positions, axis=0).max()) if len(shape.mesh.positions) else 0.0
-        most = size * (WIDE_ON_TARGET if shape in targets else WIDE)
+        most = size * (WIDE_ON_TARGET if shape.identifier in targets else WIDE)
         for leaf in _scattering(data, data.materials[shape.bsdf]):
             radius, scale = np.asarray(leaf.value("Subsurface Radius", 0.0), float), leaf.value("Subsurface Scale", 1.0)
             if float(np.max(radius * scale)) > most > 0.0:

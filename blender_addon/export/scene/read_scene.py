@@ -134,8 +134,9 @@ def _read(
         for each in fitted:
             of_one = Findings(findings.of_mitsuba) if targets else findings
             found = read_target(each.material, each.object.name, each.slot, of_one, each.leaf)
-            if found is not None and circled_axis(each.material) and keeps_place(each.object):
-                found = with_circling_tangents(found)
+            axis = circled_axis(each.material)
+            if found is not None and axis and keeps_place(each.object):
+                found = with_circling_tangents(found, axis)
             materials.append(found)
             if targets:
                 findings.take_over(of_one, (each.object.name, each.slot))
@@ -224,7 +225,7 @@ class _Walk:
             data.materials[target_bsdf(number)] = material
             assert each.material is not None  # it was read
             self.bsdfs[each.material.name_full] = target_bsdf(number)
-            axes[each.material.name_full] = circled_axis(each.material) if material.circling else ""
+            axes[each.material.name_full] = material.circling
         self.axes = CircledAxes(axes, findings)
 
     def run(self) -> None:

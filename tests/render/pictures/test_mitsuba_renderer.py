@@ -169,6 +169,16 @@ def test_start_is_the_scene_moved_into_the_bounds(tmp_path: Path) -> None:
     assert start["sheen"] == start["clearcoat"] == 1e-3
 
 
+def test_a_mesh_without_the_tangents_that_its_material_asks_for_is_refused(tmp_path: Path) -> None:
+    path = tmp_path / "scene.xml"
+    path.write_text(SCENE.format(bsdf=OPAQUE.format(more=""), light=POINT, depth=2))
+    brushed = {"sockets": {"Tangent": {"value": [0.0, 0.0, 0.0], "linked": True, "mesh": True}}}
+    with pytest.raises(BadInputError, match="shape 'target' has no attribute 'vertex_tangent', which its material"):
+        load_renderer(
+            path, "target", model="blender_principled", parameters=["roughness"], materials={"glaze": brushed}
+        )
+
+
 def test_fixed_values_stay_those_of_the_scene(tmp_path: Path) -> None:
     few = load(tmp_path, ("roughness",), more='<float name="clearcoat" value="0.7"/>')
     all_ = load(tmp_path, more='<float name="clearcoat" value="0.7"/>')
