@@ -25,7 +25,8 @@ from typing import Any
 import numpy as np
 
 from ...render.machine.temporary_folder import make_folder
-from ...render.models.graph_pictures import Evaluated, GraphPictures, Picture, Variant
+from ...render.models.finer_pictures import Picture
+from ...render.models.graph_pictures import Evaluated, GraphPictures, Variant
 from ...types.errors import BadInputError, MfoError
 from ..folder.graph_request import COPY, NodeGraph
 from ..folder.request import Request

@@ -19,8 +19,8 @@ from ...material.principled.principled_parameters import PARAMETER_OF_SOCKET, WE
 from ...types.errors import BadInputError
 from ...types.node_value import NodeValue, table_of
 from ...types.parameter import Value, Vector
+from .finer_pictures import FinerPictures, Picture, Shown
 
-Picture = NDArray[np.float32]  # (height, width, 1 or 3)
 Variant = tuple[Sequence[Value], Sequence[str]]  # all values of a graph, and the sockets that are looked at
 
 # Subpixels along a pixel of the pictures that a solve looks at: small pictures, and larger ones, whose evaluation takes
@@ -30,7 +30,10 @@ MOST_SUBPIXELS = 400_000  # of a small picture at its scale
 # Where normals change two subpixels are too few, and certainty does not know: values were 2 to 3 % off. Up to 256 x 256
 MOST_SUBPIXELS_OF_NORMALS = 1_050_000
 FINE_SCALE, FINE_SAMPLES = 4, 4  # of a scene's textures, as of the export's; its scale, where that is smaller
-KEPT_ANSWERS = 6  # answers that are kept
+KEPT_ANSWERS = 6  # answers that are kept at least
+# So many bytes of states are kept: as many as of six colours inside of a graph at 256 x 256. Of a bump's strength that
+# is all that a fit asks; six were forgotten between its starts and asked again (docs/notebook/graph_values.md)
+KEPT_BYTES = 300_000_000
 # Between two answers pictures are extrapolated along their slopes as long as they are about as exact as this, root mean
 # square: a tenth of what is seen, and a third of what a noisy reference hides
 EXTRAPOLATED = 1e-3
@@ -54,16 +57,6 @@ class Evaluated:
     elsewhere: Mapping[str, Picture] = field(default_factory=dict)
 
 
-@dataclass(frozen=True, eq=False)
-class Shown:
-    """What a texture shows: the picture that the camera sees, that for other rays where it hangs on the ray, and the
-    mean of a parameter, for points that the camera does not see."""
-
-    picture: Picture
-    elsewhere: Picture | None = None
-    outside: NDArray[np.float32] | None = None
-
-
 class Evaluate(Protocol):
     """Evaluates variants of a graph, `scale` squared subpixels to a pixel, and so many samples in each.
 
@@ -82,6 +75,12 @@ class GraphState:
 
     pictures: Mapping[str, NDArray[np.float32]]
     slopes: Mapping[str, Mapping[int, NDArray[np.float32]]]
+
+    @property
+    def bytes(self) -> int:
+        """Memory of all of them."""
+        slopes = (each for of_one in self.slopes.values() for each in of_one.values())
+        return sum(each.nbytes for each in (*self.pictures.values(), *slopes))
 
     def moved(self, by: Vector) -> GraphState:
         """The state at another vector if the pictures were linear."""
@@ -136,7 +135,9 @@ class GraphPictures:
         self._exact: list[tuple[Vector, GraphState]] = []  # those that were evaluated, the newest last
         self._moves: list[tuple[Vector, Vector]] = []  # between two states, in widths of the box, and how slopes change
         self._bend: NDArray[np.float64] | None = None  # see `_bend_of`; unknown before two states are
-        self._fine: OrderedDict[bytes, Mapping[str, Shown]] = OrderedDict()
+        self._finer = FinerPictures(
+            self._rendered, lambda vector: self.state(vector).pictures, lambda: self._is_seen, self._width
+        )
         self._seen: tuple[Picture, NDArray[np.float64]] | None = None
         self.renders = 0
 
@@ -181,8 +182,7 @@ class GraphPictures:
 
     def coarser(self, state: GraphState) -> GraphState:
         """The state as of half the subpixels along a pixel: two by two have their mean, where the camera sees all."""
-        assert self._seen is not None
-        seen = np.isfinite(self._seen[0]).all(axis=2)
+        seen = self._is_seen
         pictures = {name: _coarser(picture, seen) for name, picture in state.pictures.items()}
         slopes = {
             name: {j: _coarser(slope, seen) for j, slope in slopes.items()} for name, slopes in state.slopes.items()
@@ -209,7 +209,8 @@ class GraphPictures:
             self._moves.append((way, _change(state, other) * self._width))
         if self._moves:
             self._bend = _bend_of(self._moves)
-        self._exact = [*self._exact[1 - KEPT_ANSWERS :], (vector.copy(), state)]
+        kept = max(KEPT_BYTES // state.bytes, KEPT_ANSWERS)
+        self._exact = [*self._exact[1 - kept :], (vector.copy(), state)]
         return state
 
     def _extrapolated(self, vector: Vector) -> GraphState | None:
@@ -225,26 +226,30 @@ class GraphPictures:
         return state.moved(vector - known)
 
     def fine(self, vector: Vector) -> Mapping[str, Shown]:
-        """Finer pictures by parameter, without derivatives."""
-        key = vector.tobytes()
-        if key not in self._fine:
-            self.renders += 1
-            variants = [(self._as_values(vector), self._sockets)]
-            found = self._evaluate(variants, scale=self._fine_scale, samples=FINE_SAMPLES, elsewhere=True)
-            seen = np.isfinite(found.positions).all(axis=2).ravel()
-            self._fine[key] = {
-                # of a direction that nobody knows the mesh's own is taken
-                name_of(s): Shown(p, found.elsewhere.get(s), None if s in DIRECTIONS else _flat(p, seen)[-1])
-                for s, p in found.pictures[0].items()
-            }
-            if len(self._fine) > KEPT_ANSWERS:
-                self._fine.popitem(last=False)
-        self._fine.move_to_end(key)
-        return self._fine[key]
+        """Finer pictures by parameter, without derivatives: known ones that change as the state does where that is
+        little, else rendered."""
+        return self._finer.at(vector)
 
     def note(self, vector: Vector, fine: Mapping[str, Shown]) -> None:
         """Take over finer pictures that are known already."""
-        self._fine[vector.tobytes()] = fine
+        self._finer.note(vector, fine)
+
+    @property
+    def _is_seen(self) -> NDArray[np.bool_]:
+        """Which subpixels of a state see the target."""
+        assert self._seen is not None
+        return np.isfinite(self._seen[0]).all(axis=2)
+
+    def _rendered(self, vector: Vector) -> Mapping[str, Shown]:
+        self.renders += 1
+        variants = [(self._as_values(vector), self._sockets)]
+        found = self._evaluate(variants, scale=self._fine_scale, samples=FINE_SAMPLES, elsewhere=True)
+        seen = np.isfinite(found.positions).all(axis=2).ravel()
+        return {
+            # of a direction that nobody knows the mesh's own is taken
+            name_of(s): Shown(p, found.elsewhere.get(s), None if s in DIRECTIONS else _flat(p, seen)[-1])
+            for s, p in found.pictures[0].items()
+        }
 
     def _state(self, vector: Vector) -> GraphState:
         steps = [value.step * (1 if x + value.step <= value.upper else -1) for x, (value, _) in self._pairs(vector)]

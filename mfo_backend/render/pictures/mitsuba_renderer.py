@@ -22,7 +22,8 @@ from ...types.parameter import ParameterTable, Vector
 from ..machine.plugins import check_plugins
 from ..machine.variant import load_variant
 from ..models.blender_model import prepare_several_blender_principled
-from ..models.graph_pictures import GraphPictures, Shown
+from ..models.finer_pictures import Shown
+from ..models.graph_pictures import GraphPictures
 from ..models.leaning_normals import tell_own_normals
 from ..models.material_model import material_model
 from ..models.prepared_material import RADIANCE_KEY, Materials, PreparedMaterial

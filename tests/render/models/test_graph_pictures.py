@@ -8,7 +8,8 @@ from collections.abc import Sequence
 import numpy as np
 import pytest
 
-from mfo_backend.render.models.graph_pictures import Evaluated, GraphPictures, Shown, Variant
+from mfo_backend.render.models.finer_pictures import Shown
+from mfo_backend.render.models.graph_pictures import KEPT_ANSWERS, Evaluated, GraphPictures, Variant
 from mfo_backend.types.errors import BadInputError
 from mfo_backend.types.node_value import NodeValue
 
@@ -149,15 +150,32 @@ def test_coarser_pictures_are_means_of_four_subpixels_where_the_camera_sees_all(
             np.testing.assert_allclose(found[four], wanted, rtol=1e-6)
 
 
-def test_finer_pictures_are_kept() -> None:
+def test_finer_pictures_are_kept_and_change_with_those_of_a_solve() -> None:
     nodes = Nodes()
     pictures = graph(nodes)
     at = np.array([0.5, 0.5, 0.5, 1.0])
-    pictures.note(at, {"roughness": Shown(NOISE)})
+    pictures.note(at, {"roughness": Shown(NOISE), "base_color": Shown(np.full((6, 8, 3), 0.5, np.float32))})
     assert pictures.fine(at)["roughness"].picture is NOISE
     assert nodes.variants == []
-    np.testing.assert_allclose(pictures.fine(at + 0.25)["roughness"].picture, NOISE**1.25, rtol=1e-6)
+    far = pictures.fine(at + 0.25)
+    np.testing.assert_allclose(far["roughness"].picture, NOISE**1.25, rtol=1e-6)
     assert nodes.variants == [1]
+    near = pictures.fine(at + 0.26)
+    np.testing.assert_allclose(near["roughness"].picture, NOISE**1.26, atol=2e-3)
+    np.testing.assert_allclose(
+        near["base_color"].picture, np.repeat(NOISE * 0.76 + (1.0 - NOISE) * 0.5, 3, axis=2), atol=2e-3
+    )
+    assert nodes.variants == [1, 5, 5]  # the states at both
+
+
+def test_states_are_kept_as_far_as_memory_goes() -> None:
+    """Starts of a fit come back to the same values: those of few slopes are known longer than those of many."""
+    nodes = Nodes()
+    pictures = graph(nodes)
+    powers = np.linspace(0.1, 3.0, 2 * KEPT_ANSWERS)
+    for power in (*powers, *powers):
+        pictures.state(np.array([0.5, 0.5, 0.5, power]))
+    assert len(nodes.variants) <= len(powers)
 
 
 def test_nodes_that_cannot_be_evaluated_are_known_before_the_fit() -> None:
