@@ -12,7 +12,9 @@ from numpy.typing import NDArray
 
 Vector = NDArray[np.float64]
 Rows = NDArray[np.float32]
-RECALLED = 8  # answers, each a few megabytes at most; a solve looks back no further than to its best point
+# Answers, each a few megabytes at most: a solve looks back no further than to its best point, and the next one, or a
+# comparison, to where a solve of `plans.NEAR_EVALUATIONS` began
+RECALLED = 16
 
 
 @dataclass(frozen=True)

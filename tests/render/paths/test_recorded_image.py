@@ -6,6 +6,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from mfo_backend.fit.plans import NEAR_EVALUATIONS
 from mfo_backend.render.paths.recorded_image import RECALLED, RecordedImage, TwoSamples
 
 
@@ -88,3 +89,12 @@ def test_a_glance_changes_nothing_that_is_known():
     assert len(asked) == 2
     evaluate(np.array([2.0]))
     assert len(asked) == 3
+
+
+def test_where_a_solve_near_its_end_began_is_known_at_its_end():
+    """It is compared with there, and the next one begins there."""
+    evaluate, asked = counted()
+    for k in range(NEAR_EVALUATIONS + 1):
+        evaluate(np.array([float(k)]))
+    evaluate(np.array([0.0]))
+    assert len(asked) == NEAR_EVALUATIONS + 1
