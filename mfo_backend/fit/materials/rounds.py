@@ -138,6 +138,7 @@ def take_turns(
     queue = members[0].settings.queue
     course = WholeCourse([member.name for member in members], listener, SHARES[:1] if queue else SHARES)
     outcomes: list[FitOutcome | None] = [None for _ in members]
+    now: Pixels | None = None  # all materials as they are now, and as each was left by its own last fit
     seen: list[Pixels | None] = [None for _ in members]
     order = sorted(range(len(members)), key=lambda k: -int(masks[k].sum()))  # what lights the others most comes first
     number, still = 0, False
@@ -148,7 +149,7 @@ def take_turns(
             if should_stop():
                 still = False
                 break
-            moved = number > 1 and _moved(_look(members, present, seed), seen[k], masks[k]) > LIGHT_MOVED
+            moved = number > 1 and _moved(now, seen[k], masks[k]) > LIGHT_MOVED
             if number > 2 and not moved:
                 continue
             still = queue
@@ -171,7 +172,7 @@ def take_turns(
                 break  # the round before has said more
             outcomes[k] = outcome
             present[k] = member.renderer.table.pack(outcome.result.recovered)
-            seen[k] = None if queue else _look(members, present, seed)
+            now = seen[k] = None if queue else _look(members, present, seed)
     if not any(outcomes):
         raise Interrupted
     ended = [outcome or _as_it_was(member) for outcome, member in zip(outcomes, members, strict=True)]
@@ -209,9 +210,9 @@ def _look(members: Sequence[Member], present: Sequence[NDArray[np.float64]], see
     return members[0].renderer.image(present[0], seed=Stream.TOGETHER.seed(seed), spp=LOOK_SAMPLES)
 
 
-def _moved(now: Pixels, before: Pixels | None, mask: NDArray[np.bool_]) -> float:
+def _moved(now: Pixels | None, before: Pixels | None, mask: NDArray[np.bool_]) -> float:
     """Mean change of a target's pixels, relative to their mean."""
-    if before is None:
+    if now is None or before is None:
         return np.inf
     level = float(now[mask].mean(dtype=np.float64))
     return float(np.abs(now[mask] - before[mask]).mean(dtype=np.float64)) / max(level, 1e-30)

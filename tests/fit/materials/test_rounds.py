@@ -193,6 +193,20 @@ def test_turns_end_when_the_light_holds_still(monkeypatch: pytest.MonkeyPatch) -
     assert len(fits.calls) < 2 * rounds.MOST_ROUNDS  # what sees the same light is not fitted again
 
 
+def test_after_each_fit_all_are_rendered_once(monkeypatch: pytest.MonkeyPatch) -> None:
+    pictures: list[str] = []
+    image = Wall.image
+
+    def counted(wall: Wall, vector: np.ndarray, **how: int) -> np.ndarray:
+        pictures.append(wall._name)
+        return image(wall, vector, **how)
+
+    monkeypatch.setattr(Wall, "image", counted)
+    fits = Fits()
+    turns(fits, monkeypatch)
+    assert len(pictures) == len(fits.calls)
+
+
 def test_a_queue_fits_each_once_and_quickly(monkeypatch: pytest.MonkeyPatch) -> None:
     fits = Fits()
     found = turns(fits, monkeypatch, queue=True)
