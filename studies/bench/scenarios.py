@@ -50,7 +50,7 @@ def views(scene: int, size: int) -> BlenderRow:
     """A material by two pictures, the second from where the result of the first proposes; judged in the first."""
     with tempfile.TemporaryDirectory() as temporary:
         folder = Path(temporary)
-        run_module("studies.views.scene", "build", scene, folder)
+        run_module("studies.views.scene", "build", scene, folder, "--size", size)
         front = rendered(folder, FRONT)
         proposal = fit(folder, [front]).get("next_picture")
         second = shot_of(proposal) if proposal else SHOTS[scene % len(SHOTS)]

@@ -24,9 +24,9 @@ FRONT = Shot("Front")
 SHOTS = (*(Shot(f"T{turn:03d}") for turn in TURNS), *(Shot("Front", f"L{turn:03d}") for turn in LAMP_TURNS))
 
 
-def measure(number: int, folder: Path) -> dict[str, Any]:
-    """The row of one scene."""
-    run_module("studies.views.scene", "build", number, folder)
+def measure(number: int, folder: Path, size: int) -> dict[str, Any]:
+    """The row of one scene, whose pictures have `size` pixels along a side."""
+    run_module("studies.views.scene", "build", number, folder, "--size", size)
     front = rendered(folder, FRONT)
     one = fit(folder, [front])
     proposal = one.get("next_picture")
@@ -40,6 +40,7 @@ def measure(number: int, folder: Path) -> dict[str, Any]:
     other = third if planted == proposed else second
     return {
         "number": number,
+        "size": size,
         "proposal": proposal,
         "shots": [proposed, drawn],
         "one": _short(one),

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """The scenes of `studies.views`, run by a Python with `bpy`.
 
-    python -m studies.views.scene build NUMBER FOLDER
+    python -m studies.views.scene build NUMBER FOLDER [--size PIXELS]
     python -m studies.views.scene render FOLDER CAMERA FILE [--scene SCENE] [--moved]
 
 `build` writes truth.blend, its values in truth.json, and start.blend, with the camera Front and its turns T030 to T330
@@ -22,12 +22,12 @@ from mathutils import Matrix, Vector  # pyright: ignore[reportMissingImports]  #
 
 TARGET, CENTER = "Target", Vector((0.0, 0.0, 1.1))
 TURNS, LAMP_TURNS = range(30, 360, 30), (0, 90, 180, 270)
-SIZE, SAMPLES = 64, 128
+SAMPLES = 128
 MOVED = 1.1  # radians that the lamp is turned by
 
 
-def build(number: int, folder: Path) -> None:
-    """Write both files."""
+def build(number: int, folder: Path, size: int) -> None:
+    """Write both files, whose pictures have `size` pixels along a side."""
     folder.mkdir(parents=True, exist_ok=True)
     draw = random.Random(number)
     bpy.ops.wm.read_factory_settings(use_empty=True)
@@ -35,7 +35,7 @@ def build(number: int, folder: Path) -> None:
     scene.render.engine = "CYCLES"
     scene.cycles.device, scene.cycles.samples = "CPU", SAMPLES
     scene.cycles.use_denoising = scene.cycles.use_adaptive_sampling = False
-    scene.render.resolution_x = scene.render.resolution_y = SIZE
+    scene.render.resolution_x = scene.render.resolution_y = size
     scene.render.resolution_percentage = 100
     scene.view_settings.view_transform = "Standard"
     bpy.ops.mesh.primitive_plane_add(size=12.0)
@@ -155,6 +155,7 @@ if __name__ == "__main__":
     one = commands.add_parser("build")
     one.add_argument("number", type=int)
     one.add_argument("folder", type=Path)
+    one.add_argument("--size", type=int, default=64)
     one = commands.add_parser("render")
     one.add_argument("folder", type=Path)
     one.add_argument("camera")
@@ -163,6 +164,6 @@ if __name__ == "__main__":
     one.add_argument("--moved", action="store_true")
     chosen = parser.parse_args()
     if chosen.command == "build":
-        build(chosen.number, chosen.folder)
+        build(chosen.number, chosen.folder, chosen.size)
     else:
         render(chosen.folder, chosen.camera, chosen.file, name=chosen.scene, moved=chosen.moved)
