@@ -52,10 +52,7 @@ class Route(Protocol):
         ...
 
 
-_ONE_PICTURE = (
-    "Several pictures are fitted together on recorded light paths only: leave out all pictures but one, or choose the "
-    "preset 'paper'."
-)
+_ONE_PICTURE = "Leave out all pictures but one, or choose the preset 'paper'."
 _Says = Callable[[tuple[str, ...]], str]  # what a route does that stands in for another, by its stages' names
 _Way = tuple[Callable[[], Route], _Says]
 
@@ -143,12 +140,9 @@ def _ways(
 ) -> Iterator[_Way]:
     """The routes by their order."""
     renderer, settings = task.renderer, task.settings
-    several = renderer if settings.preset != "paper" and isinstance(renderer, SheetRenderer) else None
-    ours = renderer if settings.preset != "paper" and isinstance(renderer, MitsubaRenderer) else None
+    several = isinstance(renderer, SheetRenderer)
+    ours = renderer if settings.preset != "paper" and (several or isinstance(renderer, MitsubaRenderer)) else None
     no_losses = ""
-    if several is not None:  # nothing stands in: whole light paths are traced for one picture, and the loop takes long
-        yield lambda: RecordedRoute(task, several, plan, begin, recorded), lambda stages: ""
-        return
     if ours is not None:
         yield lambda: RecordedRoute(task, ours, plan, begin, recorded), lambda stages: ""
         if ours.graph is not None:  # no other way has the slopes of values inside nodes
@@ -160,7 +154,7 @@ def _ways(
             )
         else:
             no_losses = "The stages on whole light paths know no losses of the user's choice. "
-    if ours is None or hand_over:
+    if ours is None or (hand_over and not several):  # the loop over several pictures takes too long to stand in
         of_paper = replace(task, settings=replace(settings, preset="paper"))
         yield (
             lambda: PaperRoute(of_paper),

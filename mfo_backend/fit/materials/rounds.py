@@ -99,11 +99,6 @@ def check_members(members: Sequence[Member], reference: Image) -> list[Recorded]
         try:
             recorded.append(recorded_scene(renderer, mask, reference.counts))
         except UnrecordableError as error:
-            if isinstance(renderer, SheetRenderer):
-                raise BadInputError(
-                    f"Material '{member.name}' cannot be fitted to several pictures: {error} Leave it out, or all "
-                    "pictures but one."
-                ) from error
             recorded.append(None)
     return recorded
 

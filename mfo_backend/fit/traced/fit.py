@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ...render.pictures.mitsuba_renderer import MitsubaRenderer
+from ...render.sheet.sheet_renderer import SheetRenderer
 from ...types.certainty import Certainty, Level
 from ...types.errors import NoNearerError
 from ...types.image import Pixels
@@ -34,7 +35,8 @@ from .polish import polish
 from .polished import CORE, Polished
 from .search import Setting, race, scan
 
-if TYPE_CHECKING:  # the module needs Mitsuba's variant to be set
+if TYPE_CHECKING:  # the modules need Mitsuba's variant to be set
+    from ...render.sheet.traced_sheet import TracedSheet
     from ...render.traced.traced_paths import TracedPaths
 
 STAGES = ("scan", "race", "polish")
@@ -56,12 +58,13 @@ class TracedRoute:
         If one of the settings' losses is not defined for the reference.
     """
 
-    def __init__(self, task: FitTask, renderer: MitsubaRenderer, begin: Vector | None = None) -> None:
+    def __init__(self, task: FitTask, renderer: MitsubaRenderer | SheetRenderer, begin: Vector | None = None) -> None:
+        from ...render.sheet.traced_sheet import TracedSheet
         from ...render.traced.traced_paths import TracedPaths
 
         settings, encoding = task.settings, task.reference.encoding
         self._task, self._renderer, self._plan, self._begin = task, renderer, TransmissionPlan(), begin
-        self._paths = TracedPaths(renderer)
+        self._paths = TracedSheet(renderer) if isinstance(renderer, SheetRenderer) else TracedPaths(renderer)
         self._seen_residuals = finishing_residuals(settings, encoding, task.light, task.mask, task.view)
         own = STAGES if begin is None else STAGES[2:]
         self.stages = (*own, *self._seen_residuals, *([FLIP] if settings.preset == "best" else []))
@@ -188,7 +191,7 @@ class TracedRoute:
         return certainty, ((kept_note(unseen, table),) if unseen else ())
 
 
-def _preview(paths: TracedPaths, x: Vector, shape: tuple[int, ...], seed: int) -> Pixels:
+def _preview(paths: TracedPaths | TracedSheet, x: Vector, shape: tuple[int, ...], seed: int) -> Pixels:
     """A coarse picture: few paths of one pixel in each block, so that its cost does not grow with the picture."""
     height, width = shape
     block = math.ceil(math.sqrt(height * width * _PREVIEW_SPP / _PREVIEW_PATHS))

@@ -20,7 +20,8 @@ from ..tolerances import SIGNIFICANT
 from .sample_count import EqualCounts, NoiseComparison, Recount, TwoPictures, equal_counts, recount
 from .tile_rows import CHANNELS, LARGEST_TILE, TileRows
 
-if TYPE_CHECKING:  # the module needs Mitsuba's variant to be set
+if TYPE_CHECKING:  # the modules need Mitsuba's variant to be set
+    from ...render.sheet.traced_sheet import TracedSheet
     from ...render.traced.traced_paths import TracedPaths
 from ...solve.bounded_least_squares import NormalEquations
 from ...solve.noisy_least_squares import cross_equations
@@ -44,7 +45,7 @@ class TracedTiles:
     tiles are compressed.
     """
 
-    paths: TracedPaths
+    paths: TracedPaths | TracedSheet
     reference: Pixels = field(repr=False)
     mask: NDArray[np.bool_] = field(repr=False)
     clipped: NDArray[np.float32] | None = field(repr=False)

@@ -58,12 +58,12 @@ class SheetRenderer:
     def image(self, vector: Vector, *, seed: int, spp: int) -> Pixels:
         """See `Renderer.image`."""
         return self.sheet.radiance(
-            [r.image(vector, seed=_seed(seed, number), spp=spp) for number, r in enumerate(self.renderers)]
+            [r.image(vector, seed=seed_of(seed, number), spp=spp) for number, r in enumerate(self.renderers)]
         )
 
     def image_and_pullback(self, vector: Vector, *, seed: int, spp: int) -> tuple[Pixels, Pullback]:
         """See `Renderer.image_and_pullback`."""
-        seeds = [_seed(seed, number) for number in range(len(self.renderers))]
+        seeds = [seed_of(seed, number) for number in range(len(self.renderers))]
         found = [r.image_and_pullback(vector, seed=s, spp=spp) for r, s in zip(self.renderers, seeds, strict=True)]
 
         def pullback(gradient: Pixels) -> Vector:
@@ -77,7 +77,7 @@ class SheetRenderer:
     ) -> Callable[[], NDArray[np.float32]]:
         """See `MitsubaRenderer.pixels_later`, for flat indices of the sheet."""
         parts = [
-            (chosen, self.sheet.gains[n], self.renderers[n].pixels_later(vector, own, seed=_seed(seed, n), spp=spp))
+            (chosen, self.sheet.gains[n], self.renderers[n].pixels_later(vector, own, seed=seed_of(seed, n), spp=spp))
             for n, chosen, own in self.sheet.parted(pixels)
         ]
 
@@ -94,5 +94,6 @@ class SheetRenderer:
         return self.sheet.put([r.target_mask() for r in self.renderers])
 
 
-def _seed(seed: int, number: int) -> int:
+def seed_of(seed: int, number: int) -> int:
+    """The seed of one of the pictures, counted from 0."""
     return (seed + number * _SCENES_APART) % 2**32

@@ -8,7 +8,6 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from mfo_backend.fit.materials.rounds import Member, check_members
 from mfo_backend.fit.pictures.one_sheet import one_sheet
 from mfo_backend.fit.recover_material import recover_material
 from mfo_backend.fit.settings import FitSettings
@@ -16,12 +15,15 @@ from mfo_backend.metrics.display.tone_mapping import DisplayView
 from mfo_backend.types.errors import BadInputError, UnrecordableError
 from mfo_backend.types.image import Encoding, Image
 from mfo_backend.types.verdict import Verdict
-from tests.render.scenes import AREA, FLOOR, POINT
+from tests.fit.traced.glass import TRUTH
+from tests.fit.traced.glass import load as glass
+from tests.render.scenes import AREA, FLOOR, POINT, SKY
 
 from .two_scenes import FROM, VALUES, mean_light, pictures_of, views
 
 LABELS = ["1 (a.exr)", "2 (b.exr)", "3 (c.exr)", "4 (d.exr)"]
 FAST = FitSettings(preset="fast", verify_spp=16)
+GLASS_VIEWS = (("0, -4, 1", 32), ("3.5, -2, 1", 32))
 
 
 def one_sheet_of(renderers, references, views, labels):
@@ -109,23 +111,40 @@ def test_what_cannot_be_fitted_together_is_refused_with_the_pictures_name(tmp_pa
         one_sheet_of(renderers, shown, [DisplayView(), DisplayView(gamma=2.0)], LABELS[:2])
 
 
-def test_glass_is_not_fitted_to_several_pictures_and_it_says_what_to_do(tmp_path):
+def test_glass_is_recovered_from_two_pictures(tmp_path):
+    renderers = [glass(tmp_path / str(n), origin=origin, size=size) for n, (origin, size) in enumerate(GLASS_VIEWS)]
+    references = pictures_of(renderers, TRUTH, spp=128)
+    task = one_sheet_of(renderers, references, [DisplayView()] * 2, LABELS[:2])
+    settings = replace(FAST, model="blender_principled", verify_spp=32)
+    found = fitted(task.renderer, task.reference, settings=settings).result
+    assert [stage.name for stage in found.stages] == ["scan", "race", "polish"]
+    assert found.recovered["base_color"] == pytest.approx(TRUTH["base_color"], abs=0.03)
+    for name in ("roughness", "ior", "transmission_weight"):
+        off = abs(found.recovered[name] - TRUTH[name])
+        assert off < 4.0 * found.certainty[name].sd[0] + 0.005, name
+    assert [picture.label for picture in found.pictures] == LABELS[:2]
+    assert all(p.judgement is not None and p.judgement.verdict is Verdict.SAME for p in found.pictures)
+
+
+def test_glass_beside_a_picture_under_another_lamp_is_not_called_the_same(tmp_path):
+    renderers = [glass(tmp_path / str(n), origin=origin, size=size) for n, (origin, size) in enumerate(GLASS_VIEWS)]
+    bright = glass(tmp_path / "bright", lights=(SKY + AREA + FLOOR).replace("0.6, 0.8, 1.0", "1.5, 0.6, 0.3"), size=32)
+    first, _ = pictures_of(renderers, TRUTH, spp=128)
+    (second,) = pictures_of([bright], TRUTH, spp=128)
+    task = one_sheet_of(renderers, [first, second], [DisplayView()] * 2, LABELS[:2])
+    found = fitted(task.renderer, task.reference, settings=replace(FAST, model="blender_principled")).result
+    assert found.judgement is not None
+    assert found.judgement.verdict is Verdict.DIFFERENT
+
+
+def test_what_no_route_holds_says_what_to_do_with_several_pictures(tmp_path):
     names = ["roughness", "spec_trans"]
     renderers = views(tmp_path, [POINT, POINT], [12, 12], names)
     references = pictures_of(renderers, {"roughness": 0.3, "spec_trans": 0.9}, spp=4)
     task = one_sheet_of(renderers, references, [DisplayView()] * 2, LABELS[:2])
-    with pytest.raises(UnrecordableError, match="leave out all pictures but one, or choose the preset 'paper'"):
+    with pytest.raises(UnrecordableError, match="Leave out all pictures but one, or choose the preset 'paper'"):
         fitted(task.renderer, task.reference)
     assert fitted(task.renderer, task.reference, settings=replace(FAST, preset="paper", max_iterations=1, spp=1))
-
-
-def test_glass_among_several_materials_is_refused_before_the_fit_of_several_pictures(tmp_path):
-    names = ["roughness", "spec_trans"]
-    renderers = views(tmp_path, [POINT, POINT], [12, 12], names)
-    references = pictures_of(renderers, {"roughness": 0.3, "spec_trans": 0.9}, spp=4)
-    task = one_sheet_of(renderers, references, [DisplayView()] * 2, LABELS[:2])
-    with pytest.raises(BadInputError, match=r"^Material 'Pane' cannot be fitted to several pictures: .* Leave it out"):
-        check_members([Member("Pane", task.renderer, FAST)], task.reference)
 
 
 def test_a_picture_whose_lamp_had_moved_is_named_and_no_other(tmp_path):

@@ -13,10 +13,15 @@ NAMES = ["base_color", "roughness", "ior", "transmission_weight"]
 TRUTH = {"base_color": (0.9, 0.6, 0.3), "roughness": 0.35, "ior": 1.4, "transmission_weight": 0.9}
 
 
-def load(folder, names=NAMES, sockets=None, lights=SKY + AREA + FLOOR, **options):
+ORIGIN = "0, -4, 1"
+
+
+def load(folder, names=NAMES, sockets=None, lights=SKY + AREA + FLOOR, origin=ORIGIN, **options):
+    folder.mkdir(parents=True, exist_ok=True)
     sockets = {"Transmission Weight": {"value": 0.5, "linked": False}} if sockets is None else sockets
     materials = {"target_bsdf": {"name": "Glass", "distribution": "MULTI_GGX", "sockets": sockets}}
     path = write_scene(folder, lights, depth=8, **options)
+    path.write_text(path.read_text("utf-8").replace(ORIGIN, origin), "utf-8")
     return load_renderer(path, "target", model="blender_principled", parameters=names, materials=materials)
 
 
