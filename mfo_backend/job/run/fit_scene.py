@@ -252,9 +252,8 @@ def _fit_and_other_classes(job: _OneMaterial) -> tuple[Fitted, tuple[str, ...]]:
         return job.fit(again, nearer_than=nearer_than)
 
     def is_wanted(found: Fitted) -> bool:
-        # no class of material makes up for a wrong light
-        agree = found.result.contradiction is None
-        return agree and not job.should_stop() and is_worth_another(found.result, request.fit.parameters)
+        # pictures that contradict each other count, too: those of glass do so beside an opaque material
+        return not job.should_stop() and is_worth_another(found.result, request.fit.parameters)
 
     first = job.pictures[0]
     counted = fitted.counted if fitted.sheet is None else fitted.sheet.cut(fitted.counted, 0)

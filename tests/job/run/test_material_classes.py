@@ -29,7 +29,7 @@ from mfo_backend.render.sheet.contact_sheet import ContactSheet
 from mfo_backend.types.certainty import Certainty, Level
 from mfo_backend.types.errors import NoNearerError, UnrecordableError
 from mfo_backend.types.image import Encoding, Image
-from mfo_backend.types.result import FitResult
+from mfo_backend.types.result import Contradiction, FitResult
 from mfo_backend.types.status import Status
 from mfo_backend.types.verdict import Cause, Difference, Judgement, Verdict
 
@@ -245,6 +245,26 @@ def test_a_fit_that_was_stopped_is_not_called_worse():
     stopped = fitted(0.3)
     stopped = replace(stopped, result=replace(stopped.result, status=Status.CANCELLED, judgement=None))
     assert best_of({"of glass": stopped, "cut out": stopped}).notes == ()
+
+
+def test_pictures_that_contradict_each_other_are_fitted_from_other_classes_too(monkeypatch):
+    """Those of glass contradict each other beside an opaque material."""
+    wanted = []
+    monkeypatch.setattr(fit_scene, "with_other_classes", lambda fitted, *given: wanted.append(given[-1]) or fitted)
+    one = fitted(0.2)
+    one = replace(one, result=replace(one.result, contradiction=Contradiction(("1",), "Picture 1 does not go.")))
+    job = SimpleNamespace(
+        request=SimpleNamespace(fit=SimpleNamespace(parameters="all"), film_exposure=1.0),
+        graphs=(),
+        load=lambda parameters, graphs: [SimpleNamespace(table=SimpleNamespace(names=()))],
+        fit=lambda renderers: one,
+        start=material(),
+        pictures=[SimpleNamespace(reference=Image(one.result_image, Encoding.LINEAR), view=DisplayView())],
+        should_stop=lambda: False,
+    )
+    fit_scene._fit_and_other_classes(job)
+    (is_wanted,) = wanted
+    assert is_wanted(one)
 
 
 @pytest.mark.parametrize("several", [False, True])
