@@ -68,8 +68,7 @@ def check_members(members: Sequence[Member], reference: Image) -> list[Recorded]
     Raises
     ------
     BadInputError
-        If there are too many values, the preset fits one material alone, the camera does not see one of them, or there
-        are several pictures and one of them lets light through.
+        If there are too many values, the preset fits one material alone, or no camera sees one of them.
     """
     counts = {member.name: member.renderer.table.length for member in members}
     total = sum(counts.values())
@@ -98,7 +97,7 @@ def check_members(members: Sequence[Member], reference: Image) -> list[Recorded]
             raise BadInputError(f"Material '{member.name}': {error}") from error
         try:
             recorded.append(recorded_scene(renderer, mask, reference.counts))
-        except UnrecordableError as error:
+        except UnrecordableError:
             recorded.append(None)
     return recorded
 
