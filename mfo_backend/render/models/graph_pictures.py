@@ -37,7 +37,6 @@ KEPT_BYTES = 300_000_000
 # Between two answers pictures are extrapolated along their slopes as long as they are about as exact as this, root mean
 # square: a tenth of what is seen, and a third of what a noisy reference hides
 EXTRAPOLATED = 1e-3
-SETTLED = 1e-4  # the same where a recording begins: what is linear is not evaluated anew, what bends is
 LOOKED_AT = 20_000  # rows of two pictures whose slopes are compared
 # Weight of what is held of an entry that never moved alone, beside 1 for a move. Evaluations of the nodes in fits of
 # ramp, hue and facing at 96 x 96: 24, 16, 25 with it and with 0.01; 24, 16, 32 with 1 (docs/notebook/graph_values.md)
@@ -199,9 +198,8 @@ class GraphPictures:
         return None
 
     def settle(self, vector: Vector) -> None:
-        """Let states around this vector be extrapolated from it: evaluate the nodes there, unless that would say no
-        more than what is known."""
-        if self._nearest(vector)[0] > SETTLED:
+        """Evaluate the nodes at this vector, from where nearby states are extrapolated from now on."""
+        if not any(np.array_equal(known, vector) for known, _ in self._exact):
             self._states = OrderedDict({vector.tobytes(): self._evaluated(vector)})
 
     def _evaluated(self, vector: Vector) -> GraphState:
@@ -217,21 +215,15 @@ class GraphPictures:
 
     def _extrapolated(self, vector: Vector) -> GraphState | None:
         """The state by the slopes of a known one, None where the nodes have to be evaluated."""
-        error, nearest = self._nearest(vector)
-        if error > EXTRAPOLATED:
+        if self._bend is None:
             return None
-        known, state = self._exact[nearest]
-        return state.moved(vector - known)
-
-    def _nearest(self, vector: Vector) -> tuple[float, int]:
-        """How exact a state would be by the slopes of the best known one, root mean square, and which that is."""
-        ways = [np.abs(vector - known) / self._width for known, _ in self._exact]
-        same = next((number for number, way in enumerate(ways) if not way.any()), None)
-        if same is not None or self._bend is None:
-            return (np.inf, 0) if same is None else (0.0, same)
-        errors = [0.5 * float(way @ self._bend @ way) for way in ways]
+        ways = [(vector - known) / self._width for known, _ in self._exact]
+        errors = [0.5 * float(np.abs(way) @ self._bend @ np.abs(way)) for way in ways]
         best = int(np.argmin(errors))
-        return errors[best], best
+        if errors[best] > EXTRAPOLATED:
+            return None
+        known, state = self._exact[best]
+        return state.moved(vector - known)
 
     def fine(self, vector: Vector) -> Mapping[str, Shown]:
         """Finer pictures by parameter, without derivatives: known ones that change as the state does where that is
