@@ -35,10 +35,6 @@ class NormalEquations:
 
 Residuals = Callable[[Vector], NormalEquations]
 TRIED = 3  # evaluations after which the quadratic is believed when it promises little
-# A rejected step that promised less than this part of the cost is followed by one as short as its rise says, but at
-# least so long a part of it: half of the steps of fits with thirteen free values were rejected, up to five in a row.
-# Larger: short steps far from the end, which led into wrong basins
-NEAR_END, SHORTEST = 0.1, 0.1
 FALSE_PROMISE = 10.0  # times what noise hides: a rejected step has shown that the quadratic says no more
 
 
@@ -139,21 +135,10 @@ def solve_bounded(
                 converged = True
                 break
         else:
-            is_near = trial.finite and predicted < NEAR_END * here.cost
-            least = _damping_after(here, trial, step, scale, damping) if is_near else 0.0
-            damping, growth = max(damping * growth, least), growth * 2.0
+            damping, growth = damping * growth, growth * 2.0
             if damping > 1e12:
                 break
     return Solution(x, here, tuple(costs), converged)
-
-
-def _damping_after(here: NormalEquations, trial: NormalEquations, step: Vector, scale: Vector, damping: float) -> float:
-    """The damping after a rejected step with which one the same way would end where a parabola through both costs is
-    lowest, as J. J. More shortens his; in a box the next step may go another way."""
-    slope = max(-float(here.gradient @ step), 1e-300)
-    part = max(0.5 / (1.0 + (trial.cost - here.cost) / slope), SHORTEST)
-    curvature = float(step @ here.hessian @ step) / max(float(step @ (scale * step)), 1e-300)
-    return (curvature + damping) / part - curvature
 
 
 def step_in_box(equations: NormalEquations, x: Vector, lower: Vector, upper: Vector) -> tuple[Vector, float]:

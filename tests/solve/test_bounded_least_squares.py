@@ -11,7 +11,6 @@ from scipy.optimize import least_squares, lsq_linear
 
 from mfo_backend.solve.bounded_least_squares import (
     FALSE_PROMISE,
-    SHORTEST,
     TRIED,
     NormalEquations,
     SolveLimits,
@@ -82,53 +81,6 @@ def test_a_non_finite_trial_is_a_rejected_step():
     assert np.inf in solution.costs
     assert solution.equations.finite
     assert solution.equations.cost < with_hole(start).cost
-
-
-def bent(x: np.ndarray, noise: float = 10.0) -> NormalEquations:
-    """An arc tangent, whose tangent leads far beyond its zero, above noise that no value changes."""
-    r, slope = float(np.arctan(x[0])), 1.0 / (1.0 + x[0] ** 2)
-    return NormalEquations(0.5 * r**2 + noise, np.array([slope * r]), np.array([[slope**2]]))
-
-
-FAR_WALLS = np.full(1, -99.0), np.full(1, 99.0)
-
-
-def test_a_rejected_step_that_promised_little_is_followed_by_one_to_the_lowest_point_of_a_parabola():
-    asked: list[float] = []
-
-    def noted(x: np.ndarray) -> NormalEquations:
-        asked.append(float(x[0]))
-        return bent(x)
-
-    solution = solve_bounded(noted, np.array([3.0]), *FAR_WALLS, SolveLimits(cost_floor=10.0 + 1e-9))
-    first, far, nearer = asked[:3]
-    costs = [bent(np.array([x])).cost for x in (first, far)]
-    slope = bent(np.array([first])).gradient[0] * (far - first)
-    assert costs[1] > costs[0]
-    # c + b t + a t^2 through the first cost with its slope and the other cost
-    lowest = slope / (-2.0 * (costs[1] - costs[0] - slope))
-    assert nearer == pytest.approx(first + lowest * (far - first))
-    assert abs(solution.x[0]) < 1e-4
-    assert len(solution.costs) == 7  # 10 with damping that grows twofold, fourfold and so on alone
-
-
-def test_far_from_the_end_damping_grows_step_by_step():
-    """Where a step promises much of the cost: there short ones led into wrong basins."""
-    solution = solve_bounded(lambda x: bent(x, 0.0), np.array([3.0]), *FAR_WALLS, SolveLimits(cost_floor=1e-9))
-    assert len(solution.costs) == 10
-
-
-def test_a_step_that_raises_the_cost_beyond_all_bounds_is_not_followed_by_a_tiny_one():
-    asked: list[float] = []
-
-    def steep(x: np.ndarray) -> NormalEquations:
-        asked.append(float(x[0]))
-        good = bent(x)
-        return good if x[0] > -3.0 else NormalEquations(1e30, good.gradient, good.hessian)
-
-    solve_bounded(steep, np.array([3.0]), *FAR_WALLS)
-    first, far, nearer = asked[:3]
-    assert nearer - first == pytest.approx(SHORTEST * (far - first))
 
 
 def test_never_ends_above_the_start_and_obeys_the_budget():
