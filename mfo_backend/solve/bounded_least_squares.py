@@ -130,7 +130,7 @@ def solve_bounded(
             change = here.cost - trial.cost
             x, here = x + step, trial
             damping *= max(1.0 / 5.0, 1.0 - (2.0 * gain - 1.0) ** 3)
-            damping, growth = float(max(damping, 1e-10)), 2.0
+            damping, growth = max(damping, 1e-10), 2.0
             if change <= limits.cost_change * here.cost:
                 converged = True
                 break
