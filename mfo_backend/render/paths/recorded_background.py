@@ -72,8 +72,12 @@ def recorded_background(
 
 
 def add_radiance(image: NDArray[np.float32], pixel: NDArray[np.int64], radiance: mi.Color3f) -> NDArray[np.float32]:
-    """Add to a picture (height, width, 3) what rays of these flat pixels carry, weighed by the filter; returns it."""
+    """Add to a picture (height, width, 3) what rays of these flat pixels carry, weighed by the filter; returns it.
+
+    A path whose radiance is no number carries nothing, as in other pictures.
+    """
     flat = image.reshape(-1, 3)
+    radiance = dr.select(dr.all(dr.isfinite(radiance)), radiance, 0.0)
     dr.eval(radiance)  # component by component: converting the whole array bakes its width into a new kernel
     for channel in range(3):
         flat[:, channel] += np.bincount(pixel, radiance[channel].numpy(), len(flat))
