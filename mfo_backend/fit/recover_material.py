@@ -140,8 +140,7 @@ def _ways(
 ) -> Iterator[_Way]:
     """The routes by their order."""
     renderer, settings = task.renderer, task.settings
-    several = isinstance(renderer, SheetRenderer)
-    ours = renderer if settings.preset != "paper" and (several or isinstance(renderer, MitsubaRenderer)) else None
+    ours = renderer if isinstance(renderer, MitsubaRenderer | SheetRenderer) and settings.preset != "paper" else None
     no_losses = ""
     if ours is not None:
         yield lambda: RecordedRoute(task, ours, plan, begin, recorded), lambda stages: ""
@@ -154,7 +153,7 @@ def _ways(
             )
         else:
             no_losses = "The stages on whole light paths know no losses of the user's choice. "
-    if ours is None or (hand_over and not several):  # the loop over several pictures takes too long to stand in
+    if ours is None or (hand_over and task.sheet is None):  # over several pictures the loop takes too long to stand in
         of_paper = replace(task, settings=replace(settings, preset="paper"))
         yield (
             lambda: PaperRoute(of_paper),

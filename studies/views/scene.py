@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """The scenes of `studies.views`, run by a Python with `bpy`.
 
-    python -m studies.views.scene build NUMBER FOLDER [--size PIXELS]
+    python -m studies.views.scene build NUMBER FOLDER --size PIXELS
     python -m studies.views.scene render FOLDER CAMERA FILE [--scene SCENE] [--moved]
 
 `build` writes truth.blend, its values in truth.json, and start.blend, with the camera Front and its turns T030 to T330
@@ -155,7 +155,7 @@ if __name__ == "__main__":
     one = commands.add_parser("build")
     one.add_argument("number", type=int)
     one.add_argument("folder", type=Path)
-    one.add_argument("--size", type=int, default=64)
+    one.add_argument("--size", type=int, required=True)
     one = commands.add_parser("render")
     one.add_argument("folder", type=Path)
     one.add_argument("camera")

@@ -143,7 +143,7 @@ def take_turns(
             if should_stop():
                 still = False
                 break
-            moved = number > 1 and _moved(now, seen[k], masks[k]) > LIGHT_MOVED
+            moved = _moved(now, seen[k], masks[k]) > LIGHT_MOVED
             if number > 2 and not moved:
                 continue
             still = queue
@@ -158,7 +158,7 @@ def take_turns(
                     member.renderer, reference, quick if number == 1 else member.settings, display=display,
                     listener=course.of(k, number), should_stop=should_stop, hand_over=False, plan=plan,
                     recorded=recorded[k],
-                    begin=None if number == 1 or (number == 2 and moved) else present[k], judged=False,
+                    begin=None if number < 3 and moved else present[k], judged=False,
                 )  # fmt: skip
             except UnrecordableError as error:
                 raise UnrecordableError(f"Material '{member.name}' cannot be fitted with others: {error}") from error
@@ -205,7 +205,7 @@ def _look(members: Sequence[Member], present: Sequence[NDArray[np.float64]], see
 
 
 def _moved(now: Pixels | None, before: Pixels | None, mask: NDArray[np.bool_]) -> float:
-    """Mean change of a target's pixels, relative to their mean."""
+    """Mean change of a target's pixels, relative to their mean; any where it was not seen before."""
     if now is None or before is None:
         return np.inf
     level = float(now[mask].mean(dtype=np.float64))

@@ -19,11 +19,14 @@ from ...types.parameter import Vector
 Picture = NDArray[np.float32]  # (height, width, 1 or 3)
 Flat = Mapping[str, NDArray[np.float32]]  # by parameter, (subpixels + 1, 1 or 3), whose last row is the mean
 
-KEPT_FINER = 6  # finer pictures that are kept
+# Finer pictures that are kept, and as many rendered ones that others are told from; fits of three materials render at
+# most two (docs/notebook/graph_values.md). Fewer: the ends of a fit are rendered again. More: memory
+KEPT_FINER = 6
 # A rendered picture is changed where what the camera sees changes by no more than this, root mean square, and no value
 # by more than this part of its range: the far side, and what other rays find, stay as they are. They are seen in
 # mirrors and by light that bounces alone, and may show what the camera does not. Larger: bounced light of another
-# material. Smaller: a rendering more for each end
+# material. Smaller: a rendering more for each end. With it three materials end within 0.0002 of the FLIP that they had
+# with every picture rendered (docs/notebook/graph_values.md)
 LITTLE = 0.02
 
 

@@ -13,7 +13,8 @@ from numpy.typing import NDArray
 Vector = NDArray[np.float64]
 Rows = NDArray[np.float32]
 # Answers, each a few megabytes at most: a solve looks back no further than to its best point, and the next one, or a
-# comparison, to where a solve of `plans.NEAR_EVALUATIONS` began
+# comparison, to where a solve of `plans.NEAR_EVALUATIONS` began. With 8 a fit made 8 to 23 evaluations twice
+# (docs/notebook/graph_values.md)
 RECALLED = 16
 
 

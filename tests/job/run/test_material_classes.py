@@ -247,22 +247,26 @@ def test_a_fit_that_was_stopped_is_not_called_worse():
     assert best_of({"of glass": stopped, "cut out": stopped}).notes == ()
 
 
+def job_that_ends(fitted, picture, *, film_exposure=1.0, should_stop=True):
+    """A job on a linear picture, whose fit from the scene's material ends so."""
+    return SimpleNamespace(
+        request=SimpleNamespace(fit=SimpleNamespace(parameters="all"), film_exposure=film_exposure),
+        graphs=(),
+        load=lambda parameters, graphs: [SimpleNamespace(table=SimpleNamespace(names=()))],
+        fit=lambda renderers: fitted,
+        start=material(),
+        pictures=[SimpleNamespace(reference=Image(picture, Encoding.LINEAR), view=DisplayView())],
+        should_stop=lambda: should_stop,
+    )
+
+
 def test_pictures_that_contradict_each_other_are_fitted_from_other_classes_too(monkeypatch):
     """Those of glass contradict each other beside an opaque material."""
     wanted = []
     monkeypatch.setattr(fit_scene, "with_other_classes", lambda fitted, *given: wanted.append(given[-1]) or fitted)
     one = fitted(0.2)
     one = replace(one, result=replace(one.result, contradiction=Contradiction(("1",), "Picture 1 does not go.")))
-    job = SimpleNamespace(
-        request=SimpleNamespace(fit=SimpleNamespace(parameters="all"), film_exposure=1.0),
-        graphs=(),
-        load=lambda parameters, graphs: [SimpleNamespace(table=SimpleNamespace(names=()))],
-        fit=lambda renderers: one,
-        start=material(),
-        pictures=[SimpleNamespace(reference=Image(one.result_image, Encoding.LINEAR), view=DisplayView())],
-        should_stop=lambda: False,
-    )
-    fit_scene._fit_and_other_classes(job)
+    fit_scene._fit_and_other_classes(job_that_ends(one, one.result_image, should_stop=False))
     (is_wanted,) = wanted
     assert is_wanted(one)
 
@@ -280,14 +284,6 @@ def test_a_glow_is_sought_below_what_the_first_picture_shows_of_the_target(sever
     found = SimpleNamespace(judgement=None, recovered={}, notes=())
     fitted = module.Fitted(found, nothing, nothing, counted, sheet)
     picture = np.array([[[9.0, 9.0, 9.0], [1.0, 2.0, 4.0], [3.0, 2.0, 6.0]]], np.float32)
-    job = SimpleNamespace(
-        request=SimpleNamespace(fit=SimpleNamespace(parameters="all"), film_exposure=2.0),
-        graphs=(),
-        load=lambda parameters, graphs: [SimpleNamespace(table=SimpleNamespace(names=()))],
-        fit=lambda renderers: fitted,
-        start=material(),
-        pictures=[SimpleNamespace(reference=Image(picture, Encoding.LINEAR), view=DisplayView())],
-        should_stop=lambda: True,
-    )
+    job = job_that_ends(fitted, picture, film_exposure=2.0)
     assert fit_scene._fit_and_other_classes(job) == (fitted, ())
     assert asked == [MOST_GLOW * 5.0 / 2.0]
