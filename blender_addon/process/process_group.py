@@ -7,6 +7,7 @@ import contextlib
 import os
 import signal
 import subprocess
+from pathlib import Path
 from typing import Any
 
 TERMINATE = signal.SIGTERM
@@ -30,7 +31,7 @@ def signal_group(pid: int, number: int) -> None:
 
 
 def process_lives(pid: int) -> bool:
-    """Whether there is a process of this id; always so on Windows, where asking would end it."""
+    """Whether there is a process of this id, zombies apart; always so on Windows, where asking would end it."""
     if os.name == "nt":
         return True
     try:
@@ -39,4 +40,13 @@ def process_lives(pid: int) -> bool:
         return False
     except OSError:
         return True
-    return True
+    return not _is_zombie(pid)
+
+
+def _is_zombie(pid: int) -> bool:
+    # of an orphan until process 1 asks for it, which in many containers takes long or never happens
+    try:
+        state = Path(f"/proc/{pid}/stat").read_bytes().rpartition(b")")[2].split()[0]  # proc(5)
+    except (OSError, IndexError):  # not Linux
+        return False
+    return state == b"Z"

@@ -6,13 +6,13 @@ from __future__ import annotations
 import os
 import sys
 from collections.abc import Callable
+from pathlib import Path
 
 
 def liveness_of(pid: int) -> Callable[[], bool]:
     """A function that says whether process `pid` still lives.
 
-    A parent that died stays visible as a zombie until it is reaped, and its number may be used again; for our own
-    parent the change of `getppid` is free of both.
+    The number of a parent that died may be used again; for our own parent the change of `getppid` is free of that.
     """
     if sys.platform == "win32":
         return _windows_liveness(pid)
@@ -26,9 +26,18 @@ def liveness_of(pid: int) -> Callable[[], bool]:
             return False
         except PermissionError:  # it lives and belongs to someone else
             return True
-        return True
+        return not _is_zombie(pid)
 
     return lives
+
+
+def _is_zombie(pid: int) -> bool:
+    # of an orphan until process 1 asks for it, which in many containers takes long or never happens
+    try:
+        state = Path(f"/proc/{pid}/stat").read_bytes().rpartition(b")")[2].split()[0]  # proc(5)
+    except (OSError, IndexError):  # not Linux
+        return False
+    return state == b"Z"
 
 
 def _windows_liveness(pid: int) -> Callable[[], bool]:

@@ -27,3 +27,15 @@ def test_folders_of_blenders_that_are_gone_go(tmp_path: Path, monkeypatch: pytes
     with temporary_folder("view") as folder:
         assert {path.name for path in tmp_path.iterdir()} == kept | {folder.name}
     assert {path.name for path in tmp_path.iterdir()} == kept
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="only Linux names zombies in /proc")
+def test_the_folder_of_a_zombie_goes(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    from blender_addon.process.temporary_folder import temporary_folder
+
+    monkeypatch.setattr(tempfile, "tempdir", str(tmp_path))
+    with subprocess.Popen([sys.executable, "-c", ""]) as zombie:
+        os.waitid(os.P_PID, zombie.pid, os.WEXITED | os.WNOWAIT)  # it has ended, and nobody has asked for it
+        (tmp_path / f"material_fit_check_{zombie.pid}_abcd_123").mkdir()
+        with temporary_folder("view") as folder:
+            assert list(tmp_path.iterdir()) == [folder]

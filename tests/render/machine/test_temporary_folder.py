@@ -40,6 +40,16 @@ def test_folders_of_backends_that_are_gone_go(tmp_path: Path, monkeypatch: pytes
     assert {path.name for path in tmp_path.iterdir()} == kept
 
 
+@pytest.mark.skipif(sys.platform != "linux", reason="only Linux names zombies in /proc")
+def test_the_folder_of_a_zombie_goes(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(tempfile, "tempdir", str(tmp_path))
+    with subprocess.Popen([sys.executable, "-c", ""]) as zombie:
+        os.waitid(os.P_PID, zombie.pid, os.WEXITED | os.WNOWAIT)  # it has ended, and nobody has asked for it
+        (tmp_path / f"mfo_nodes_{zombie.pid}_abcd_123").mkdir()
+        remove_abandoned()
+        assert list(tmp_path.iterdir()) == []
+
+
 def test_a_folder_goes_at_the_end_of_its_block(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(tempfile, "tempdir", str(tmp_path))
     with temporary_folder("llvm") as folder:
