@@ -3,6 +3,8 @@
 
 from __future__ import annotations
 
+import sys
+import traceback
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
@@ -15,7 +17,7 @@ from ...render.pictures.mitsuba_renderer import MitsubaRenderer
 from ...render.pictures.renderer import Interrupted
 from ...render.sheet.recorded_sheet import RecordedSheet
 from ...render.sheet.sheet_renderer import SheetRenderer
-from ...types.errors import BadInputError, UnrecordableError
+from ...types.errors import BadInputError, MfoError, UnrecordableError
 from ...types.event import Listener
 from ...types.image import Image, Pixels
 from ...types.status import Status
@@ -38,6 +40,7 @@ MOST_ROUNDS = 4
 # recording; all looked the same in the end. Smaller: rounds that follow noise. Larger: light that is not right.
 LIGHT_MOVED = 0.01
 NOT_YET = "The fit was stopped before it came to this material."
+FAILED = "A fit of this material failed ({what}): what was found before it stays; the log holds the details."
 
 
 Recorded = RecordedScene | RecordedSheet | None  # None where whole light paths are traced
@@ -117,7 +120,8 @@ def take_turns(
     The first round searches from nothing, quickly. The second has the preset's plan and searches again what sees other
     light than at its own first fit: in wrong light a coat or a sheen is easily missed, and no solution nearby has it.
     Those after it fit again what sees other light than at its own last fit, from its values there. A queue ends with
-    the first. `light` is the reference as scene-linear radiance, `recorded` what `check_members` says.
+    the first. `light` is the reference as scene-linear radiance, `recorded` what `check_members` says. A material whose
+    fit fails without a reason that a user can do something about stays as it is from then on, and a note says so.
 
     Raises
     ------
@@ -132,6 +136,7 @@ def take_turns(
     queue = members[0].settings.queue
     course = WholeCourse([member.name for member in members], listener, SHARES[:1] if queue else SHARES)
     outcomes: list[FitOutcome | None] = [None for _ in members]
+    failed: dict[int, Exception] = {}
     now: Pixels | None = None  # all materials as they are now, and as each was left by its own last fit
     seen: list[Pixels | None] = [None for _ in members]
     order = sorted(range(len(members)), key=lambda k: -int(masks[k].sum()))  # what lights the others most comes first
@@ -143,6 +148,8 @@ def take_turns(
             if should_stop():
                 still = False
                 break
+            if k in failed:
+                continue
             moved = _moved(now, seen[k], masks[k]) > LIGHT_MOVED
             if number > 2 and not moved:
                 continue
@@ -162,14 +169,22 @@ def take_turns(
                 )  # fmt: skip
             except UnrecordableError as error:
                 raise UnrecordableError(f"Material '{member.name}' cannot be fitted with others: {error}") from error
+            except MfoError:
+                raise
+            except Exception as error:
+                traceback.print_exc(file=sys.stderr)
+                failed[k] = error
+                continue
             if outcome.result.status is Status.CANCELLED and number > 1:
                 break  # the round before has said more
             outcomes[k] = outcome
             present[k] = member.renderer.table.pack(outcome.result.recovered)
             now = seen[k] = None if queue else _look(members, present, seed)
     if not any(outcomes):
-        raise Interrupted
+        raise next(iter(failed.values()), Interrupted())
     ended = [outcome or _as_it_was(member) for outcome, member in zip(outcomes, members, strict=True)]
+    for k, error in failed.items():
+        ended[k] = _failed(ended[k], error)
     values = [x if outcome else m.renderer.start for x, outcome, m in zip(present, outcomes, members, strict=True)]
     return Turns(tuple(ended), tuple(values), number, still)
 
@@ -190,6 +205,14 @@ def _as_it_was(member: Member) -> FitOutcome:
     result = result_at(renderer, renderer.start, Status.CANCELLED, Status.CANCELLED.sentence, 0.0)
     nothing = np.zeros((*mask.shape, 3), np.float32)
     return FitOutcome(replace(result, notes=(NOT_YET,)), nothing, nothing, mask)
+
+
+def _failed(before: FitOutcome, error: Exception) -> FitOutcome:
+    """The outcome before a fit that failed, with a note; no value is sure in it."""
+    what = f"{type(error).__name__}: {error}".strip().split("\n")[0][:200]
+    notes = (*(note for note in before.result.notes if note != NOT_YET), FAILED.format(what=what))
+    result = replace(before.result, status=Status.FAILED, message=Status.FAILED.sentence, notes=notes, certainty={})
+    return replace(before, result=result)
 
 
 def show_all(members: Sequence[Member], vectors: Sequence[NDArray[np.float64]]) -> None:

@@ -3,6 +3,8 @@
 
 from __future__ import annotations
 
+import sys
+import traceback
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
@@ -47,8 +49,11 @@ def with_other_classes(
     fit_from: Callable[[MaterialClass], Fitted],
     is_wanted: Callable[[Fitted], bool],
 ) -> Fitted:
-    """The fit or a better one of other `classes`, tried while one is wanted; where none is better, the notes say so."""
-    first, no_nearer, refused = fitted.result.recovered, [], []
+    """The fit or a better one of other `classes`, tried while one is wanted; where none is better, the notes say so.
+
+    A trial that fails costs no more than its time.
+    """
+    first, no_nearer, refused, failed = fitted.result.recovered, [], [], []
     for other in classes:
         if not is_wanted(fitted):
             break
@@ -61,12 +66,16 @@ def with_other_classes(
             no_nearer.append(other)
             fitted = replace(fitted, result=_with_cost(fitted.result, ended.seconds, ended.passes))
             continue
+        except Exception:
+            traceback.print_exc(file=sys.stderr)
+            failed.append(other)
+            continue
         if again.result.status is not Status.CANCELLED:
             no_nearer.append(other)
         fitted = better(fitted, again, other, material)
     if fitted.result.recovered is not first:  # the note of the class that was better says enough
         return fitted
-    notes = (*fitted.result.notes, *tried_notes(no_nearer, refused))
+    notes = (*fitted.result.notes, *tried_notes(no_nearer, refused, failed))
     return replace(fitted, result=replace(fitted.result, notes=notes))
 
 
@@ -98,6 +107,9 @@ def with_plainer_glow(
     try:
         again = fit_from(glowing)
     except UnrecordableError:
+        return fitted
+    except Exception:
+        traceback.print_exc(file=sys.stderr)
         return fitted
     before, after = fitted.result, again.result
     if before.judgement is None or after.judgement is None:

@@ -62,13 +62,17 @@ class MaterialClass:
         return f"The material of the scene did not match, so the fit began again from one that is {self.name}."
 
 
-def tried_notes(no_nearer: Sequence[MaterialClass], refused: Sequence[MaterialClass]) -> tuple[str, ...]:
-    """For the notes of a result that no other class took the place of: what was tried, and what no fit holds."""
-    said = ["The material of the scene did not match."] if no_nearer or refused else []
+def tried_notes(
+    no_nearer: Sequence[MaterialClass], refused: Sequence[MaterialClass], failed: Sequence[MaterialClass]
+) -> tuple[str, ...]:
+    """Notes of a result that no other class took the place of: what was tried, what no fit holds, what has failed."""
+    said = ["The material of the scene did not match."] if no_nearer or refused or failed else []
     if no_nearer:
         said.append(f"Fits that began again from one that is {_or(no_nearer)} came not clearly nearer.")
     if refused:
         said.append(f"No fit holds one that is {_or(refused)}.")
+    if failed:
+        said.append(f"Fits that began again from one that is {_or(failed)} failed: the log holds the details.")
     return (" ".join(said),) if said else ()
 
 

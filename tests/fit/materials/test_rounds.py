@@ -11,7 +11,15 @@ import pytest
 
 from mfo_backend.fit.materials import rounds
 from mfo_backend.fit.materials.evened_light import evened_light
-from mfo_backend.fit.materials.rounds import LIGHT_MOVED, MOST_VALUES, NOT_YET, Member, check_members, take_turns
+from mfo_backend.fit.materials.rounds import (
+    FAILED,
+    LIGHT_MOVED,
+    MOST_VALUES,
+    NOT_YET,
+    Member,
+    check_members,
+    take_turns,
+)
 from mfo_backend.fit.materials.whole_course import WholeCourse
 from mfo_backend.fit.plans import RecordedPlan
 from mfo_backend.fit.result.outcome import FitOutcome
@@ -146,7 +154,10 @@ SHOWN = Image(light_of(*TRUTH), Encoding.LINEAR)
 class Fits:
     """Stands in for a fit of one wall: what it finds is exact in the light that the other gives as it is shown."""
 
-    def __init__(self, stop_after: int = 100) -> None:
+    def __init__(
+        self, stop_after: int = 100, *, fails_at: tuple[int | None, Exception] = (-1, ValueError("never"))
+    ) -> None:
+        self.fails_at, self.failure = fails_at  # the number of a call, or None for all
         self.calls: list[tuple[str, str, bool]] = []
         self.recorded: list[object] = []
         self.plans: list[object] = []
@@ -154,6 +165,8 @@ class Fits:
 
     def __call__(self, wall: Wall, reference: Image, settings: FitSettings, **options: object) -> FitOutcome:
         self.calls.append((wall._name, settings.preset, options["begin"] is not None))
+        if self.fails_at in (None, len(self.calls) - 1):
+            raise self.failure
         self.recorded.append(options["recorded"])
         self.plans.append(options["plan"])
         left = wall._name == "left"
@@ -247,3 +260,21 @@ def test_what_was_found_before_a_stop_is_kept(monkeypatch: pytest.MonkeyPatch) -
     assert found.present[1] == pytest.approx(walls()[1].start)
     with pytest.raises(Interrupted):
         turns(Fits(stop_after=0), monkeypatch)
+
+
+@pytest.mark.parametrize("queue", [False, True])
+def test_a_fit_that_fails_loses_no_other(queue: bool, monkeypatch: pytest.MonkeyPatch) -> None:
+    fits = Fits(fails_at=(1 if queue else 3, np.linalg.LinAlgError("Singular matrix")))
+    found = turns(fits, monkeypatch, queue=queue)
+    first, second = found.outcomes
+    assert first.result.status is Status.CONVERGED
+    assert second.result.status is Status.FAILED
+    assert second.result.notes == (FAILED.format(what="LinAlgError: Singular matrix"),)
+    # what an earlier round has found of it stays, and none tries again
+    assert (second.result.recovered == second.result.initial) is queue
+    assert found.present[1] == pytest.approx(walls()[1].table.pack(second.result.recovered))
+    assert [name for name, *_ in fits.calls].count("right") == (1 if queue else 2)
+    with pytest.raises(MemoryError):
+        turns(Fits(fails_at=(None, MemoryError())), monkeypatch, queue=queue)
+    with pytest.raises(BadInputError):
+        turns(Fits(fails_at=(1, BadInputError("It is refused."))), monkeypatch, queue=queue)

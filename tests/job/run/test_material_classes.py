@@ -183,6 +183,11 @@ def test_a_plain_glow_takes_the_place_of_many_layers():
     assert (kept.recovered, kept.certainty) == (layers, sure)
     assert kept.seconds == 2.0
 
+    def fails(other):
+        raise np.linalg.LinAlgError("Singular matrix")
+
+    assert module.with_plainer_glow(rich, material(), classes, fails) is rich
+
 
 def test_what_a_class_has_held_is_part_of_its_result():
     glass = material(Transmission_Weight=1.0, Metallic=0.0)
@@ -208,7 +213,7 @@ def best_of(ends):
         end = ends[other.name]
         if end is None:
             raise UnrecordableError("It has a texture.")
-        if isinstance(end, NoNearerError):
+        if isinstance(end, Exception):
             raise end
         return end
 
@@ -233,6 +238,18 @@ def test_what_was_tried_in_vain_is_said():
         "The material of the scene did not match. Fits that began again from one that is cut out came not clearly "
         "nearer. No fit holds one that is of glass.",
     )
+
+
+def test_a_trial_that_fails_does_not_lose_the_first_result(capsys):
+    found = best_of({"of glass": ValueError("Singular matrix"), "cut out": fitted(0.3)})
+    assert found.recovered == fitted(0.2).result.recovered
+    assert found.notes == (
+        "The material of the scene did not match. Fits that began again from one that is cut out came not clearly "
+        "nearer. Fits that began again from one that is of glass failed: the log holds the details.",
+    )
+    assert "Singular matrix" in capsys.readouterr().err
+    better = best_of({"of glass": MemoryError(), "cut out": fitted(0.02, Verdict.SAME, Status.CONVERGED)})
+    assert better.notes == (other_classes(material(), 0.0)[1].note,)
 
 
 def test_the_class_that_is_better_is_the_only_one_named():
