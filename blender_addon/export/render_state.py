@@ -54,12 +54,10 @@ def render_state(view_layer: bpy.types.ViewLayer, scene: bpy.types.Scene) -> Ite
                 put(item, "hide_viewport", item.hide_render)
             # also of a source of particles or nodes that is put away; `show_self` of every instance asks for it
             put(item, "show_instancer_for_viewport", item.show_instancer_for_render)
-            if item.hide_render:
-                continue
-            if item in in_layer and item.hide_get(view_layer=view_layer):
+            if not item.hide_render and item in in_layer and item.hide_get(view_layer=view_layer):
                 hidden.append(item)
                 item.hide_set(False, view_layer=view_layer)
-            _use_render_settings(item, put)
+            _use_render_settings(item, put)  # also of what is hidden: a Boolean or nodes may take its faces
             flushed |= item.mode == "EDIT" and item.update_from_editmode()
         if changed or hidden or flushed:
             view_layer.update()
@@ -119,6 +117,16 @@ def instanced_objects(view_layer: bpy.types.ViewLayer) -> set[str]:
         names.update(each.name_full for each in shown)
         todo += shown
     return names
+
+
+def without_modifiers(view_layer: bpy.types.ViewLayer) -> set[str]:
+    """Return the names of the objects that Cycles takes without their modifiers where particles are of them.
+
+    An object of the layer that the layer does not render is not evaluated for them, only for what else shows it
+    (measured with Blender 4.3, 5.0 and 5.2).
+    """
+    in_layer = {item.name_full for item in view_layer.objects}
+    return in_layer - rendered_objects(view_layer) - instanced_objects(view_layer)
 
 
 def rendered_layer(scene: bpy.types.Scene, view_layer: bpy.types.ViewLayer) -> bpy.types.ViewLayer:
@@ -234,6 +242,13 @@ def shown_by(instance: bpy.types.DepsgraphObjectInstance) -> bpy.types.Object:
     """What puts an instance into the scene, whose settings Cycles takes beside those of the object: itself, if it is
     no instance."""
     return instance.parent if instance.is_instance and instance.parent is not None else instance.object
+
+
+def geometry_of(instance: bpy.types.DepsgraphObjectInstance, bare: set[str]) -> bpy.types.Object:
+    """The object with the faces that Cycles shows of an instance, not evaluated where `without_modifiers` has it."""
+    item, system = instance.object, instance.particle_system
+    of_particle = system is not None and system.settings.render_type == "OBJECT"
+    return item.original if of_particle and item.type == "MESH" and item.original.name_full in bare else item
 
 
 def hides_original(item: bpy.types.Object) -> bool:

@@ -7,6 +7,7 @@ from collections.abc import Callable, Iterator
 from typing import Any
 
 import bpy
+from mathutils import Vector
 
 from .artist_settings import bumped_box
 from .rig import Draw, Rig, Setting, color_of, put_socket
@@ -311,6 +312,22 @@ def _nested(rig: Rig, _: Draw) -> None:
     outer.hide_render = True
 
 
+def _cut_by_what_is_hidden(rig: Rig, draw: Draw) -> None:
+    """A hole in the box, of a mesh that is rounder in a render and hidden there, as cutters are."""
+    cutter = rig.target.copy()
+    cutter.data = bpy.data.meshes.new("Cutter")
+    rig.scene.collection.objects.link(cutter)
+    corners = [(x, y, z) for x in (-0.5, 0.5) for y in (-0.5, 0.5) for z in (-0.5, 0.5)]
+    sides = [(0, 1, 3, 2), (4, 6, 7, 5), (0, 4, 5, 1), (2, 3, 7, 6), (0, 2, 6, 4), (1, 5, 7, 3)]
+    cutter.data.from_pydata(corners, [], sides)
+    cutter.location = rig.box.matrix_world @ Vector((0.4, -0.5, 0.3))
+    around = cutter.modifiers.new("Round", "SUBSURF")
+    around.levels, around.render_levels = 0, int(draw.integers(1, 4))
+    cutter.hide_render = True
+    hole = rig.box.modifiers.new("Hole", "BOOLEAN")
+    hole.object, hole.solver = cutter, "EXACT"
+
+
 def _edited(rig: Rig, draw: Draw) -> None:
     """The box in Edit Mode, or another object that has its mesh."""
     rig.box.modifiers.new("Bevel", "BEVEL").width = 0.2
@@ -363,6 +380,7 @@ def _all() -> Iterator[Setting]:
     yield Setting("eye closed", _eye_closed)
     yield Setting("nested collections", _nested)
     yield Setting("edited mesh", _edited)
+    yield Setting("hidden cutter", _cut_by_what_is_hidden)
 
 
 OWNER_SETTINGS = tuple(_all())

@@ -38,12 +38,14 @@ from ..nodes.dependence import deformed_generated
 from ..nodes.displacement import moves_faces
 from ..render_state import (
     background_objects,
+    geometry_of,
     hides_original,
     note_viewport,
     render_state,
     rendered_layer,
     rendered_objects,
     shown_by,
+    without_modifiers,
 )
 from ..steps import Steps
 from .origin import moved, note_far_scattering, note_wide_scattering, scene_origin
@@ -210,6 +212,7 @@ class _Walk:
         self.bakes, self.baked = bakes, set[str]()  # BSDFs that are to be baked for each object
         self.data, self.targets = data, targets
         self.depsgraph, self.rendered, self.findings = depsgraph, rendered, findings
+        self.bare = without_modifiers(depsgraph.view_layer)
         self.meshes: dict[tuple[str, int], CornerMesh | None] = {}
         self.pieces: list[tuple[str, str, Piece]] = []  # with names of object and shape
         self.targets_left_out = [0] * len(targets)  # triangles
@@ -301,10 +304,10 @@ class _Walk:
 
     def _add_mesh(self, instance: bpy.types.DepsgraphObjectInstance, matrix: NDArray[np.float64], own: bool) -> None:
         """Add an instance; the faces of its `own` object may be fitted."""
-        item = instance.object
-        key = (item.name_full, item.data.as_pointer())
+        item, source = instance.object, geometry_of(instance, self.bare)
+        key = (item.name_full, source.data.as_pointer())
         if key not in self.meshes:
-            mesh = read_mesh(item, self.depsgraph, self.axes.of(item))
+            mesh = read_mesh(source, self.depsgraph, self.axes.of(item))
             self.meshes[key] = mesh = None if mesh is None else self.known.mesh(item.name_full, mesh)
             displaces = any(moves_faces(material_of_slot(item, slot)) for slot in range(slot_count(item)))
             if mesh is not None and displaces and self.bakes is not None:

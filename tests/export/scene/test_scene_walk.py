@@ -144,6 +144,50 @@ def test_a_hidden_object_is_instanced_where_cycles_shows_it(
     assert not cube.hide_viewport
 
 
+def cut(item: Any, cube: Any) -> None:
+    """Cut a hole into a thick copy of `item`."""
+    item.modifiers.new("Thick", "SOLIDIFY").thickness = 0.2
+    hole = item.modifiers.new("Hole", "BOOLEAN")
+    hole.object, hole.solver = cube, "EXACT"
+    cube.location, cube.scale = (0.0, 0.0, 0.0), (4.0, 4.0, 4.0)
+
+
+@pytest.mark.parametrize("hidden", ["object", "collection above", "out of the layer"])
+@pytest.mark.parametrize(
+    "put", [pytest.param(lambda item, cube: sprinkle(item, cube, collection=False), id="particles"), scatter, cut]
+)
+def test_modifiers_of_what_is_hidden_are_as_cycles_has_them(
+    put: Any, hidden: str, scene: Any, export: Any, render_cycles: Any, render_mitsuba: Any
+) -> None:
+    """A cutter and a source are hidden and have modifiers: those of the render, or none where particles are of it."""
+    item = lit_quad(scene)
+    bpy.ops.mesh.primitive_cube_add(size=0.3, location=(0.0, 0.0, -9.0))
+    cube = bpy.context.object
+    cube.data.materials.append(emission_material("Sprinkle", (0.2, 0.5, 1.0)))
+    around = cube.modifiers.new("Round", "SUBSURF")
+    around.levels, around.render_levels = 0, 3
+    outer, inner = bpy.data.collections.new("Outer"), bpy.data.collections.new("Inner")
+    scene.collection.children.link(outer)
+    outer.children.link(inner)
+    for owner in list(cube.users_collection):
+        owner.objects.unlink(cube)
+    inner.objects.link(cube)
+    if put is scatter:
+        scatter(item, of=cube)
+    else:
+        put(item, cube)
+    if hidden == "object":
+        cube.hide_render = True
+    elif hidden == "collection above":
+        outer.hide_render = True
+    else:
+        bpy.context.view_layer.layer_collection.children["Outer"].exclude = True
+    bpy.context.view_layer.update()
+    theirs = render_cycles()
+    assert render_mitsuba(export(item)).mean(axis=(0, 1)) == pytest.approx(theirs.mean(axis=(0, 1)), rel=0.02)
+    assert around.levels == 0
+
+
 def test_the_view_layer_that_renders_is_exported(scene: Any, export: Any) -> None:
     item = lit_quad(scene)
     other = add_quad("Other", 1.0, -1.0, diffuse_material("Other", (0.5, 0.5, 0.5)))
