@@ -14,7 +14,7 @@ import bpy
 from ..export.nodes.closure_leaves import ClosureLeaf
 from ..export.nodes.graph_findings import GROUP, GROUP_INPUT, feeding
 from ..export.nodes.leaf_kinds import KINDS, UNUSED_SOCKETS
-from ..export.nodes.shader_graph import Links, source_of
+from ..export.nodes.shader_graph import Links, plain_value, source_of
 from ..export.nodes.target_shader import DIRECTIONS, TargetShader
 from ..export.nodes.target_shader import Place as SocketPlace
 from . import ranges
@@ -23,7 +23,8 @@ from .ranges import COLOR, GAIN, NUMBER, OFFSET, Range, plain_range, range_of_in
 from .tint import IMAGE, TINT_GAIN, TINT_OFFSET, is_tint, tint_of
 
 # what a fit on recorded light does not change: light that the target emits, and what lets light through
-NOT_FITTED = ("Emission Color", "Emission Strength", "Alpha", "Transmission Weight")
+EMISSION = ("Emission Color", "Emission Strength")
+NOT_FITTED = (*EMISSION, "Alpha", "Transmission Weight")
 WEIGHT = "Weight"  # the share of a shader in a mix, among the names of its sockets
 MOST = 256  # values of one graph; what lies further upstream is not offered
 _AXES = ("X", "Y", "Z", "W")
@@ -132,11 +133,17 @@ def _factors_of(leaf: ClosureLeaf) -> list[SocketPlace]:
 
 
 def _held(target: TargetShader) -> Iterator[SocketPlace]:
-    """What no value that is fitted may reach: displacement, a mix's normals, and its shaders of which the fit holds a
-    picture."""
+    """What no value that is fitted may reach: displacement, glow, holes, a mix's normals, and its shaders of which the
+    fit holds a picture."""
     displacement = target.displacement
     if displacement is not None:
         yield SocketPlace(displacement, ())
+    for leaf in (target.leaf, *target.others):
+        places = TargetShader(leaf).places
+        strength = places.get("Emission Strength")
+        is_dark = strength is not None and not strength.socket.is_linked and plain_value(strength.socket) == 0.0
+        held = NOT_FITTED[len(EMISSION) :] if is_dark else NOT_FITTED
+        yield from (places[name] for name in held if name in places and places[name].socket.is_linked)
     for leaf in (target.leaf, *target.others) if target.is_mixed else ():
         directions = (leaf.node.inputs.get(name) for name in DIRECTIONS)
         yield from (SocketPlace(socket, leaf.groups) for socket in directions if socket is not None)

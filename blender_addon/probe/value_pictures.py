@@ -23,8 +23,9 @@ def answer(request: Mapping[str, Any]) -> dict[str, Any]:
     mix, the `places` of the values (entries of request.json), `variants`, each with a number or colour for every
     place in `values` and with the names of its `sockets`, the `scale` in subpixels along a pixel, `samples` of each
     subpixel and the `folder` for the files; `elsewhere` where the files of that name are asked for, too, for the
-    first variant, and `far_side` as there. Answered are `files`, by socket for each variant, `elsewhere`, by socket as
-    of the command `sockets`, and of the target the file `positions`, NaN beside it, and the `camera` of that command.
+    first variant, and `depths` and `far_side` as there. Answered are `files`, by socket for each variant, `elsewhere`,
+    by socket as of the command `sockets`, and of the target the file `positions`, NaN beside it, and the `camera` of
+    that command.
 
     Raises
     ------
@@ -47,7 +48,8 @@ def answer(request: Mapping[str, Any]) -> dict[str, Any]:
         elsewhere[name] = f"elsewhere_{len(elsewhere):02d}.npy"
         np.save(folder / elsewhere[name], values)
 
-    surface = renders.take(variants, request["scale"], take, far_side=bool(request.get("far_side")))
+    depths = range(int(request.get("depths", 1)))
+    surface = renders.take(variants, request["scale"], take, depths=depths, far_side=bool(request.get("far_side")))
     if request.get("elsewhere"):
-        renders.take_elsewhere(variants[0], take_elsewhere)
+        renders.take_elsewhere(variants[0], take_elsewhere, depths)
     return {"files": files, "elsewhere": elsewhere, **write_surface(target, surface, folder)}

@@ -94,6 +94,7 @@ class BlenderPrincipledModel:
         """See `RecordedModel`."""
         if self._cycles.shader == "translucent":
             raise UnrecordableError("The material is translucent and recorded paths hold reflected light only.")
+        given = dict(given) | {"alpha": 1.0}  # as many camera rays end on it as its alpha says
         for name, opaque in (("transmission_weight", 0.0), ("alpha", 1.0)):
             if name in free or given.get(name, opaque) != opaque:
                 raise UnrecordableError(f"The material has {name!r} and recorded paths hold reflected light only.")

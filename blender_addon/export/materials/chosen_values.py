@@ -17,6 +17,7 @@ from ...graph_values.own_groups import shared_groups
 from ...graph_values.place import read
 from ...graph_values.table import WEIGHT, GraphValue, GraphValueError, named, plain_name
 from ...process.saved_file import save_copy
+from ...versions import PRINCIPLED
 from ..camera.camera_model import Region, edges_of
 from ..camera.render_region import picture_size
 from ..findings import ExportError, Findings
@@ -92,9 +93,11 @@ def _not_fitted(target: TargetShader, fit: dict[str, Any]) -> str | None:
         return "the preset paper fits the values of sockets alone"
     for name, opaque in OPAQUE.items():
         socket = target.sockets.get(name)
-        if socket is not None and (socket.is_linked or plain_value(socket) != opaque):
+        if socket is None or (name == "Alpha" and socket.is_linked and not target.is_mixed):
+            continue  # holes that stay as they are
+        if socket.is_linked or plain_value(socket) != opaque:
             return f"a fit of them needs an opaque material, and {name} is {'linked' if socket.is_linked else 'set'}"
-    if lets_light_in(target.leaf):
+    if target.leaf.node.bl_idname != PRINCIPLED and lets_light_in(target.leaf):
         return f"a fit of them needs an opaque material, and '{target.name}' lets light through"
     return None
 

@@ -16,6 +16,7 @@ COPY = "graph/scene.blend"  # of the file, which a Blender evaluates while value
 LARGEST = 1e6  # of a bound
 MOST_VALUES = 256
 MOST_DEPTHS = 32
+NEAR_AND_FAR = 2  # depths of an opaque target: what the camera sees, and its far side
 FINEST = 4  # subpixels along a pixel; fewer where the picture is large
 _EVALUATE = ("scene", "layer", "object", "slot", "sockets", "view")
 LARGEST_SIDE = 16384  # pixels; Blender's own limit is 65536, a fit at that size is a mistake

@@ -28,7 +28,7 @@ from ...render.machine.temporary_folder import make_folder
 from ...render.models.finer_pictures import Picture
 from ...render.models.graph_pictures import Evaluated, GraphPictures, Variant
 from ...types.errors import BadInputError, MfoError
-from ..folder.graph_request import COPY, NodeGraph
+from ..folder.graph_request import COPY, NEAR_AND_FAR, NodeGraph
 from ..folder.request import Request
 from .more_pictures import JobPicture
 
@@ -97,7 +97,8 @@ class GraphBlender:
                 for values, names in variants
             ],
             "scale": scale, "samples": samples, "elsewhere": elsewhere, "folder": str(self._folder),
-            "far_side": elsewhere and graph.depths > 1,
+            "far_side": elsewhere and graph.depths == NEAR_AND_FAR,
+            "depths": graph.depths if elsewhere and graph.depths > NEAR_AND_FAR else 1,
         })  # fmt: skip
         pictures = [{socket: self._picture(file) for socket, file in files.items()} for files in answer["files"]]
         others = {socket: self._picture(file) for socket, file in answer.get("elsewhere", {}).items()}

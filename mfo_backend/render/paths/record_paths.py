@@ -25,11 +25,11 @@ from ..camera.pixel_cells import PixelCells
 from ..camera.primary_rays import TILE, PrimaryRays, fresh_sampler, tile_order
 from ..lamps.met_lamps import DELTA, SceneLamps, lights_have_no_extent
 from ..random_numbers.even_points import even_points
-from ..transport.camera_view import CameraView
 from ..transport.ray_starts import RayStarts
 from ..transport.shadow_rays import ShadowRays
 from ..transport.smooth_facets import leaves_on, met_light, seen_side
 from ..transport.traced_radiance import traced_radiance
+from .first_hits import first_hits
 from .merged_lanes import TechniqueLanes, coverage_of, merged_lanes
 from .record_settings import RecordSettings
 from .recorded_background import add_radiance, recorded_background
@@ -89,17 +89,13 @@ def record_paths(
         sensor = settings.sensor or scene.sensors()[0]
         width, height = (int(v) for v in sensor.film().crop_size())
         rays = _camera_rays(scene, shape, settings, width, height)
-        every_ray = rays.ray(dr.arange(mi.UInt32, len(rays)))
-        seen = hit = CameraView(scene).met(every_ray)
-        target = mi.ShapePtr(shape)
-        dr.make_opaque(target)  # its number in this process is no part of the kernel
-        on_target = hit.is_valid() & (hit.shape == target)
-        dr.eval(hit, on_target)
-        index = dr.compress(on_target)
+        ends = first_hits(scene, shape, rays, cut_out=settings.cut_out, seed=settings.seed)
+        dr.eval(ends.met, ends.on_target, ends.gone, ends.lost)
+        index = dr.compress(ends.on_target)
         if dr.width(index) == 0:
             raise BadInputError("No pixel sees the target: check the camera and that the object is not hidden.")
         position, filter_weight, ray = rays.position(index), rays.weight(index), rays.ray(index)
-        hit = dr.gather(mi.PreliminaryIntersection3f, hit, index)
+        hit = dr.gather(mi.PreliminaryIntersection3f, ends.met, index)
         si = hit.compute_surface_interaction(ray, mi.RayFlags.All)
         glow = si.emitter(scene).eval(si) * filter_weight if shape.is_emitter() and not settings.glows else None
         radiance = shape.emitter().unlayered(si, settings.unit_emission) * filter_weight if settings.glows else None
@@ -145,7 +141,7 @@ def record_paths(
 
         covered, coverage = coverage_of(hits.pixels, position, filter_weight)
         constant = recorded_background(
-            scene, (height, width), rays, seen, on_target, covered, lamps, seed=settings.seed + 0x2545F49,
+            scene, (height, width), rays, ends, covered, lamps, seed=settings.seed + 0x2545F49,
             depth=max(settings.depth, 2), light_paths=settings.light_paths, hide_emitters=settings.hide_emitters,
         )  # fmt: skip
         if glow is not None:
@@ -168,21 +164,17 @@ def _camera_rays(scene: mi.Scene, shape: mi.Shape, settings: RecordSettings, wid
     if settings.highlights is None or not any(mi.has_flag(e.flags(), DELTA) for e in scene.emitters()):
         return PrimaryRays(sensor, PixelCells.grid(per_axis), order, tile, settings.seed)
 
-    target, view = mi.ShapePtr(shape), CameraView(scene)
-    dr.make_opaque(target)
-
     def rays_in(cells: PixelCells) -> PrimaryRays:
         return PrimaryRays(sensor, cells, order, tile, settings.seed, four=True)
 
-    def first_hits(rays: PrimaryRays) -> tuple[mi.SurfaceInteraction3f, mi.Bool]:
+    def hits_of(rays: PrimaryRays) -> tuple[mi.SurfaceInteraction3f, mi.Bool]:
+        ends = first_hits(scene, shape, rays, cut_out=settings.cut_out, seed=settings.seed)
         ray = rays.ray(dr.arange(mi.UInt32, len(rays)))
-        hit = view.met(ray)
-        on_target = hit.is_valid() & (hit.shape == target)
-        si = hit.compute_surface_interaction(ray, mi.RayFlags.All, on_target)
-        return _turned(shape, settings, _facing(scene, shape, settings, si)), on_target
+        si = ends.met.compute_surface_interaction(ray, mi.RayFlags.All, ends.on_target)
+        return _turned(shape, settings, _facing(scene, shape, settings, si)), ends.on_target
 
     cells = PixelCells.grid((per_axis + 1) // 2)
-    return rays_in(highlight_cells(scene, shape, cells, rays_in, first_hits, settings.highlights))
+    return rays_in(highlight_cells(scene, shape, cells, rays_in, hits_of, settings.highlights))
 
 
 def _without_parametrisation(si: mi.SurfaceInteraction3f, *, own_normal: bool) -> mi.SurfaceInteraction3f:

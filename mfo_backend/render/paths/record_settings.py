@@ -25,7 +25,8 @@ class RecordSettings:
     leaves lights out of the background, as the integrator's option does. Only every `stride`-th tile of pixels along
     both axes is recorded, which bounds the memory of large pictures. `two_sided` says that back faces reflect without a
     wrapper. `held` names values of the target's material that textures give; its plugin tells them. `bumped` says that
-    nodes give it normals, and `mixed` that it is a `closure_tree`. With a `surface`, lanes keep their `subpixel` on it.
+    nodes give it normals, `cut_out` that camera rays pass where its alpha is below 1, and `mixed` that it is a
+    `closure_tree`. With a `surface`, lanes keep their `subpixel` on it.
     With `light_paths` light over other surfaces has Cycles' blur, clamping and limits. `pixels` (height, width) are the
     only ones looked at; where they hold all that see the target, nothing is missed. With `highlights` more rays start
     where lights of no extent are mirrored. Every camera ray meets the lights with extent in as many independent
@@ -46,6 +47,7 @@ class RecordSettings:
     two_sided: bool = False
     held: tuple[str, ...] = ()
     bumped: bool = False
+    cut_out: bool = False
     surface: SeenSurface | None = None
     mixed: bool = False
     light_paths: LightPaths | None = None

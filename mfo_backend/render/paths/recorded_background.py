@@ -18,14 +18,14 @@ from ..camera.primary_rays import PrimaryRays, fresh_sampler
 from ..lamps.met_lamps import SceneLamps
 from ..transport.below_surface import seen_from_below
 from ..transport.traced_radiance import traced_radiance
+from .first_hits import FirstHits
 
 
 def recorded_background(
     scene: mi.Scene,
     size: tuple[int, int],
     rays: PrimaryRays,
-    met: mi.PreliminaryIntersection3f,
-    on_target: mi.Bool,
+    ends: FirstHits,
     covered: NDArray[np.int64],
     lamps: SceneLamps,
     *,
@@ -34,18 +34,20 @@ def recorded_background(
     light_paths: LightPaths | None,
     hide_emitters: bool,
 ) -> NDArray[np.float32]:
-    """Radiance (height, width, 3) of a picture of this `size`, linear Rec.709, of rays that pass by the target, in the
+    """Radiance (height, width, 3) of a picture of this `size`, linear Rec.709, of rays that pass the target, in the
     `covered` pixels only.
 
-    `met` is what the rays meet, `covered` counts as they do; paths are of up to `depth`.
+    `ends` is where the rays end, `covered` counts as they do; paths are of up to `depth`.
     """
     image = np.zeros((*size, 3), np.float32)
     looked_at = np.zeros(len(rays.pixel), bool)
     looked_at[covered] = True
     position = rays.position(dr.arange(mi.UInt32, len(rays)))
-    wanted = ~on_target & dr.gather(mi.Bool, own_memory(looked_at, mi.Bool), position)
+    wanted = ~ends.on_target & dr.gather(mi.Bool, own_memory(looked_at, mi.Bool), position)
+    if ends.lost is not None:
+        wanted &= ~ends.lost
     # a path tracer's first step takes ten times as long as a look at the environment, and most rays see nothing else
-    traced = wanted if lamps else wanted & met.is_valid()
+    traced = wanted if lamps else wanted & ends.met.is_valid()
     rest = wanted & ~traced
     dr.eval(traced, rest)
 
@@ -54,7 +56,7 @@ def recorded_background(
 
     index = dr.compress(traced)
     if dr.width(index) > 0:
-        sampler, ray = fresh_sampler(seed, dr.width(index)), rays.ray(index)
+        sampler, ray = fresh_sampler(seed, dr.width(index)), ends.onward(rays.ray(index), index)
         add(index, traced_radiance(scene, sampler, ray, light_paths, depth, hide=hide_emitters, walked=True))
         add(index, seen_from_below(scene, ray, sampler, light_paths, depth))
     index = dr.compress(rest)

@@ -106,7 +106,9 @@ class RecordedScene:
         self._walks = renderer.model == "blender_principled" and getattr(bsdf, "has_below", False)
         walks = self._walks and not (self._mixed and bsdf.walks_are_held)
         self.model = recorded_model(renderer.model, bsdf, renderer.mix, glows=self._glows, walks=walks)
-        self._fixed = self.model.values(values_in_scene(renderer.shape.bsdf(), self.model), renderer.table.names)
+        given = values_in_scene(bsdf, self.model)
+        self._cut_out = given.get("alpha", 1.0) != 1.0
+        self._fixed = self.model.values(given, renderer.table.names)
         self._bumped = bool(getattr(renderer.shape.bsdf(), "bumped", False))
         self._fixed |= dict.fromkeys((*self.model.normals.names, *self.model.walks.names))
         self.graph = graph or renderer.graph
@@ -193,6 +195,7 @@ class RecordedScene:
             two_sided=self.model.two_sided,
             held=self._kept,
             bumped=self._bumped,
+            cut_out=self._cut_out,
             walks=(NEAR_WALKS if near else FAR_WALKS) if self._walks else (),
             surface=None if self._varying is None else self._varying.surface(vector),
             mixed=self._mixed,
@@ -235,6 +238,7 @@ class RecordedScene:
             two_sided=self.model.two_sided,
             held=self._kept,
             bumped=self._bumped,
+            cut_out=self._cut_out,
             walks=NEAR_WALKS if self._walks else (),
             mixed=self._mixed,
             light_paths=self.renderer.light_paths,
