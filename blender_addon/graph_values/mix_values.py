@@ -7,8 +7,10 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
+import bpy
+
 from ..export.nodes.closure_leaves import ClosureLeaf, Factor
-from ..export.nodes.leaf_kinds import UNUSED_SOCKETS, inputs_of, is_fitted, kind_of, shines
+from ..export.nodes.leaf_kinds import TRANSPARENT, UNUSED_SOCKETS, inputs_of, is_fitted, kind_of, shines
 from ..export.nodes.shader_graph import plain_value
 from ..export.nodes.target_shader import DIRECTIONS, TargetShader, leaf_name
 from ..versions import PRINCIPLED
@@ -56,8 +58,25 @@ def inside_values(target: TargetShader) -> Sequence[GraphValue | MixValue]:
     """The values beside the sockets of the target that a fit may change: of a mix the others', and of its nodes."""
     if not target.is_mixed:
         return graph_values(target)
+    if is_cut_out(target):  # holes stay as they are, and with them what the mix is made of
+        return [value for value in graph_values(target) if not any(_is_of_mix(name) for name in value.sockets)]
     values: list[GraphValue | MixValue] = [*mix_values(target)]
     return named_apart(values + graph_values(target)) if why_no_mix_values(target) is None else []
+
+
+def is_cut_out(target: TargetShader) -> bool:
+    """Whether a mix is of one shader that reflects and of Transparent, of one grey each."""
+    others = [leaf.node for leaf in target.others]
+    return bool(others) and all(node.bl_idname == TRANSPARENT and _is_grey(node.inputs["Color"]) for node in others)
+
+
+def _is_grey(socket: bpy.types.NodeSocket) -> bool:
+    return not socket.is_linked and len(set(plain_value(socket)[:3])) == 1
+
+
+def _is_of_mix(socket: str) -> bool:
+    """Whether the name of a socket is that of another shader's, or of a weight."""
+    return "/" in socket or socket == WEIGHT
 
 
 def default_values(target: TargetShader, *, all_leaves: bool) -> list[GraphValue | MixValue]:

@@ -139,11 +139,7 @@ def _held(target: TargetShader) -> Iterator[SocketPlace]:
     if displacement is not None:
         yield SocketPlace(displacement, ())
     for leaf in (target.leaf, *target.others):
-        places = TargetShader(leaf).places
-        strength = places.get("Emission Strength")
-        is_dark = strength is not None and not strength.socket.is_linked and plain_value(strength.socket) == 0.0
-        held = NOT_FITTED[len(EMISSION) :] if is_dark else NOT_FITTED
-        yield from (places[name] for name in held if name in places and places[name].socket.is_linked)
+        yield from _held_places(TargetShader(leaf)) if leaf.node.bl_idname in KINDS else ()
     for leaf in (target.leaf, *target.others) if target.is_mixed else ():
         directions = (leaf.node.inputs.get(name) for name in DIRECTIONS)
         yield from (SocketPlace(socket, leaf.groups) for socket in directions if socket is not None)
@@ -151,6 +147,16 @@ def _held(target: TargetShader) -> Iterator[SocketPlace]:
         if leaf.node.bl_idname not in KINDS:
             yield from (SocketPlace(socket, leaf.groups) for socket in leaf.node.inputs)
             yield from _factors_of(leaf)
+
+
+def _held_places(shader: TargetShader) -> Iterator[SocketPlace]:
+    """The linked sockets of a shader that no fit with values of nodes changes; of a shader that is dark no glow."""
+    places = shader.places
+    strength = places.get("Emission Strength")
+    is_dark = strength is not None and not strength.socket.is_linked and plain_value(strength.socket) == 0.0
+    for name in NOT_FITTED:
+        if name in places and places[name].socket.is_linked and not (is_dark and name in EMISSION):
+            yield places[name]
 
 
 def named(values: Sequence[Named], wanted: Sequence[str]) -> list[Named]:

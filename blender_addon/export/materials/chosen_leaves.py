@@ -37,11 +37,11 @@ def named_mix_values(material: bpy.types.Material | None, fit: dict[str, Any]) -
     own = {plain_name(f"{label}/{target.own_name(name)}"): name for name in target.places}
     wanted: list[str] = [own.get(plain_name(name), str(name)) for name in asked]
     inside = [name for name in wanted if "/" in name]
-    problem = why_no_mix_values(target)
-    if inside and problem is not None:
+    problem, known = why_no_mix_values(target), inside_values(target)
+    if inside and not known and problem is not None:
         raise ExportError(f"{', '.join(inside)} cannot be fitted: {problem}.")
     try:
-        found = named(inside_values(target), inside)
+        found = named(known, inside)
     except GraphValueError as error:
         raise ExportError(str(error)) from error
     of_mix = [value.name for value in found if isinstance(value, MixValue)]

@@ -24,6 +24,7 @@ from typing import Any
 
 import drjit as dr
 import mitsuba as mi
+import numpy as np
 
 from ..arrays.clamp import mean
 from ..principled.bumped_normals import LEAF_NORMALS
@@ -139,6 +140,12 @@ class ClosureTree(mi.BSDF):
         A held material lets light through if it is glass, cut out or translucent.
         """
         return not self.clear and not any(leaf.material.lets_in for leaf in self.held)
+
+    @property
+    def has_grey_holes(self) -> bool:
+        """Whether only Transparent of one grey, whatever its share, keeps it from being opaque."""
+        is_grey = [not isinstance(c, mi.Texture) and float(np.ptp(np.ravel(c))) == 0.0 for c, _ in self.clear]
+        return bool(is_grey) and all(is_grey) and not any(leaf.material.lets_in for leaf in self.held)
 
     @property
     def absorbing(self) -> BlenderPrincipled | None:

@@ -97,7 +97,10 @@ def record_paths(
         position, filter_weight, ray = rays.position(index), rays.weight(index), rays.ray(index)
         hit = dr.gather(mi.PreliminaryIntersection3f, ends.met, index)
         si = hit.compute_surface_interaction(ray, mi.RayFlags.All)
-        glow = si.emitter(scene).eval(si) * filter_weight if shape.is_emitter() and not settings.glows else None
+        share = filter_weight
+        if settings.cut_out and settings.mixed:  # its shaders have their shares, holes included
+            share = share / dr.maximum(1.0 - dr.mean(shape.bsdf().eval_null_transmission(si)), 1e-6)
+        glow = si.emitter(scene).eval(si) * share if shape.is_emitter() and not settings.glows else None
         radiance = shape.emitter().unlayered(si, settings.unit_emission) * filter_weight if settings.glows else None
         if lamps.seen:
             before = lamps.met(ray, si, mi.Bool(True), camera=True) * filter_weight
@@ -126,9 +129,11 @@ def record_paths(
         if settings.depth == 2 or settings.light_paths is None:
             si = _without_parametrisation(si, own_normal=settings.bumped)
         # exact lights alone look at hits once each, and compute them again instead of keeping them
-        dr.eval(si if sampled or settings.mixed else (), own, coat, smooth, diffuse, position, filter_weight, held)
+        dr.eval(
+            si if sampled or settings.mixed else (), own, coat, smooth, diffuse, position, filter_weight, share, held
+        )
         plugin = shape.bsdf() if settings.mixed else None
-        hits = _Hits(si, position, filter_weight, held, len(rays.pixel), plugin, own, coat, smooth, diffuse)
+        hits = _Hits(si, position, share, held, len(rays.pixel), plugin, own, coat, smooth, diffuse)
         exact = [part for part in _delta_lights(scene, hits, shadows) if dr.width(part.position) > 0]
         if radiance is not None:
             nowhere = dr.zeros(mi.Vector3f, dr.width(position))

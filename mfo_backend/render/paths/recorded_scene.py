@@ -107,7 +107,10 @@ class RecordedScene:
         walks = self._walks and not (self._mixed and bsdf.walks_are_held)
         self.model = recorded_model(renderer.model, bsdf, renderer.mix, glows=self._glows, walks=walks)
         given = values_in_scene(bsdf, self.model)
-        self._cut_out = given.get("alpha", 1.0) != 1.0
+        cut_out = given.get("alpha", 1.0) != 1.0
+        if self._mixed and (cut_out or not (bsdf.is_opaque or bsdf.has_grey_holes)):
+            raise UnrecordableError("The material is mixed with one that lets light through.")
+        self._cut_out = cut_out or (self._mixed and not bsdf.is_opaque)
         self._fixed = self.model.values(given, renderer.table.names)
         self._bumped = bool(getattr(renderer.shape.bsdf(), "bumped", False))
         self._fixed |= dict.fromkeys((*self.model.normals.names, *self.model.walks.names))
@@ -116,8 +119,6 @@ class RecordedScene:
         self._varying, self._evaluated = (each and varying(each) for each in (renderer.graph, self.graph))
         self.jacobian = RecordedJacobian(self.model, renderer.table, self._fixed, varying=self._evaluated)
         self._held = (*self.jacobian.held, *(self._varying.lanes if self._varying is not None else ()))
-        if self._mixed and not renderer.shape.bsdf().is_opaque:
-            raise UnrecordableError("The material is mixed with one that lets light through.")
 
     @property
     def _kept(self) -> tuple[str, ...]:

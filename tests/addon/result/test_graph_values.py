@@ -15,6 +15,9 @@ JOB = Path("job")
 PATHS = {name: ["Principled BSDF", name] for name in ("Base Color", "Roughness", "Coat Roughness")}
 
 
+COLOURED = ("Base Color", "Roughness", "Coat Roughness")  # what the graph is linked to
+
+
 @pytest.fixture
 def graph(scene: SimpleNamespace) -> SimpleNamespace:
     """Noise through a ramp of three stops, mixed with a colour by a group that another material has, too; the ramp is
@@ -267,6 +270,41 @@ def test_what_a_fit_is_refused(graph: SimpleNamespace, tmp_path: Path) -> None:
     with pytest.raises(ExportError, match="needs an opaque material, and Transmission Weight is set"):
         export(parameters=["Mix/Factor"])
     assert not (tmp_path / "job").exists()
+
+
+def cut_out(graph: SimpleNamespace, how: str) -> None:
+    """Let a noise of its own make holes in the material."""
+    tree, surface = graph.material.node_tree, graph.material.node_tree.get_output_node("CYCLES").inputs["Surface"]
+    ramp = tree.nodes.new("ShaderNodeValToRGB")
+    ramp.label = "Holes"
+    tree.links.new(tree.nodes.new("ShaderNodeTexNoise").outputs[0], ramp.inputs[0])
+    holes = ramp.outputs["Color"]
+    if how == "alpha":
+        tree.links.new(holes, graph.shader.inputs["Alpha"])
+        return
+    mix, clear = tree.nodes.new("ShaderNodeMixShader"), tree.nodes.new("ShaderNodeBsdfTransparent")
+    clear.inputs["Color"].default_value = (1.0, 0.5, 0.5, 1.0) if how == "tinted" else (0.8, 0.8, 0.8, 1.0)
+    for output, place in ((holes, 0), (clear.outputs[0], 1), (graph.shader.outputs[0], 2)):
+        tree.links.new(output, mix.inputs[place])
+    tree.links.new(mix.outputs[0], surface)
+
+
+@pytest.mark.parametrize(("how", "fitted"), [("alpha", True), ("transparent", True), ("tinted", False)])
+def test_values_inside_nodes_of_a_cut_out_are_fitted(
+    graph: SimpleNamespace, tmp_path: Path, how: str, fitted: bool
+) -> None:
+    """Its holes stay: what makes them is none of the values."""
+    from blender_addon.export.job import export_job
+
+    cut_out(graph, how)
+    target = graph.bpy.data.objects["Väse"]
+    request = export_job(graph.bpy.context, target, tmp_path / "job", reference=None, fit={}).request["graph"]
+    assert request["depths"] == 4
+    names = {value["name"] for value in request.get("values", ())}
+    assert ("Mix/Factor" in names) is fitted
+    assert not [name for name in names if name.startswith("Holes")]
+    if fitted:
+        assert {socket for value in request["values"] for socket in value["sockets"]} <= set(COLOURED)
 
 
 @pytest.mark.parametrize("kind", ["Glass", "Refraction", "Translucent"])

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from mfo_backend.render.pictures.renderer import load_renderer
-from mfo_backend.scene.exr_file import write_exr
+from mfo_backend.scene.exr_file import read_exr, write_exr
 from mfo_backend.types.errors import UnrecordableError
 from mfo_backend.types.light_paths import LightPaths
 from tests.render.scenes import AREA, FLOOR, POINT, SKY, write_scene
@@ -25,12 +25,20 @@ def holes(tmp_path):
     return path
 
 
-def load(folder, lights, alpha, *, names=NAMES, **limits):
-    sockets = {
-        "Alpha": {"value": 0.6, "linked": alpha is not None, "texture": alpha and str(alpha)},
-        "Emission Color": {"value": [0.2, 0.4, 0.5], "linked": False},
-    }
-    materials = {"target_bsdf": {"name": "Leaf", "distribution": "MULTI_GGX", "sockets": sockets}}
+def load(folder, lights, alpha, *, names=NAMES, mixed=None, **limits):
+    """A ball with this alpha, 0.6 or a texture; `mixed` with Transparent of that grey or colour it is its share."""
+    share = {"value": 0.6, "linked": alpha is not None, "texture": alpha and str(alpha)}
+    material = {"name": "Leaf", "distribution": "MULTI_GGX", "sockets": {}}
+    if mixed is None:
+        material["sockets"]["Alpha"] = share
+    else:
+        clear = {"value": 0.4, "linked": False}
+        if alpha is not None:
+            write_exr(folder / "clear.exr", 1.0 - read_exr(alpha).pixels)
+            clear |= {"linked": True, "texture": str(folder / "clear.exr")}
+        leaf = {"shader": "transparent", "sockets": {"Base Color": {"value": mixed, "linked": False}}}
+        material |= {"weight": share, "leaves": [leaf | {"weight": clear}]}
+    materials = {"target_bsdf": material}
     path = write_scene(folder, lights, size=16, depth=8)
     return load_renderer(
         path, "target", model="blender_principled", parameters=names, materials=materials,
@@ -51,9 +59,10 @@ def recorded(renderer):
 
 @pytest.mark.parametrize("lights", [POINT + SKY, AREA], ids=["point and sky", "lamps"])
 @pytest.mark.parametrize("textured", [False, True])
-def test_what_shows_through_holes_is_as_path_traced(lights, textured, holes, tmp_path):
+@pytest.mark.parametrize("mixed", [None, [0.7, 0.7, 0.7]], ids=["alpha", "transparent"])
+def test_what_shows_through_holes_is_as_path_traced(lights, textured, mixed, holes, tmp_path):
     """The far side of the ball, the floor and the sky behind it."""
-    got, expected = recorded(load(tmp_path, lights + FLOOR, holes if textured else None))
+    got, expected = recorded(load(tmp_path, lights + FLOOR, holes if textured else None, mixed=mixed))
     assert got.mean(axis=0) == pytest.approx(expected.mean(axis=0), rel=0.01)
     error = np.sqrt(np.mean((got - expected) ** 2) / np.mean(expected**2))
     assert error < 0.05  # half a pixel of 400 rays is left to chance
@@ -72,3 +81,5 @@ def test_holes_that_change_are_not_recorded(tmp_path):
 
     with pytest.raises(UnrecordableError, match="'alpha'"):
         RecordedScene(renderer, 1)
+    with pytest.raises(UnrecordableError, match="lets light through"):
+        RecordedScene(load(tmp_path, SKY, None, mixed=[0.9, 0.5, 0.5]), 1)
