@@ -48,9 +48,11 @@ def tile_noise(
 ) -> TileNoise:
     """Noise of the linear `reference` (height, width, 3) in `groups`, tiles of this `side`, given the model's pixels.
 
-    `model` (p, 3) has a row for each pixel of the recording; only pixels in `keep` (p,) are compared. The recording's
-    own noise is part of the answer, as it is of the residual.
+    `model` (p, 3) has a row for each pixel of the recording; only pixels in `keep` (p,) are compared, or all where that
+    is none: of what lets light through everywhere. The recording's own noise is part of the answer, as it is of the
+    residual.
     """
+    keep = keep if keep.any() else np.ones_like(keep)
     width = reference.shape[1]
     pixels = np.divmod(paths.pixel, width)  # rows and columns
     step = max(int(np.gcd.reduce(np.concatenate([np.diff(np.unique(n // side)) for n in pixels]))), 1)

@@ -17,6 +17,7 @@ from typing import Any
 import drjit as dr
 import mitsuba as mi
 
+from ...types.light_paths import NO_LIMIT
 from ..camera.primary_rays import PrimaryRays
 from ..random_numbers.even_points import even_points
 from ..transport.camera_view import CameraView
@@ -58,7 +59,7 @@ def first_hits(scene: mi.Scene, shape: mi.Shape, rays: PrimaryRays, *, cut_out: 
     if not cut_out:
         return FirstHits(met, on_target)
     (chance,) = even_points(1, number, rays.position(number), len(rays.pixel), seed + 0x1B873593)
-    most = dr.opaque(mi.UInt32, int(getattr(scene.integrator(), "transparent_bounces", 0)))
+    most = dr.opaque(mi.UInt32, int(getattr(scene.integrator(), "transparent_bounces", NO_LIMIT)))
     return FirstHits(*_beyond(view, RayStarts(scene), shape.bsdf(), target, ray, met, on_target, chance, most))
 
 

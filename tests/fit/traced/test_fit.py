@@ -168,10 +168,11 @@ def test_cancel_returns_the_best_so_far(tmp_path, calls):
     assert np.isfinite(renderer.table.pack(result.recovered)).all()
 
 
-def test_an_opaque_surface_with_alpha_needs_no_other_preset(tmp_path):
-    sockets = {"Alpha": {"value": 0.6, "linked": False}}
-    renderer = load(tmp_path, ["base_color", "roughness", "metallic"], sockets, size=40)
-    x = renderer.table.pack({"base_color": (0.7, 0.4, 0.2), "roughness": 0.4, "metallic": 0.7})
+def test_an_alpha_that_is_free_needs_no_other_preset(tmp_path):
+    renderer = load(
+        tmp_path, ["base_color", "roughness", "alpha"], {"Metallic": {"value": 0.7, "linked": False}}, size=40
+    )
+    x = renderer.table.pack({"base_color": (0.7, 0.4, 0.2), "roughness": 0.4, "alpha": 0.6})
     result, _ = fit(renderer, renderer.image(x, seed=5, spp=64))
     assert [stage.name for stage in result.stages] == ["scan", "race", "polish"]
     np.testing.assert_allclose(renderer.table.pack(result.recovered), x, atol=0.06)
