@@ -10,8 +10,6 @@ from functools import partial
 import numpy as np
 from numpy.typing import NDArray
 
-from ...metrics.display.baked_view import BakedView
-from ...metrics.display.tone_mapping import DisplayView
 from ...render.camera.primary_rays import TILE
 from ...render.paths.recorded_scene import RecordedScene
 from ...render.pictures.mitsuba_renderer import MitsubaRenderer
@@ -34,16 +32,7 @@ from ..plans import RecordedPlan
 from ..random_streams import Stream
 from ..result.course import Course
 from ..result.outcome import Choice, End, RouteEnds
-from ..squares.residuals import (
-    CensoredResidual,
-    DisplayedResidual,
-    MakeResidual,
-    MakeWeighted,
-    RelativeResidual,
-    WeightedDisplayedResidual,
-    WeightedResidual,
-    log_residual,
-)
+from ..squares.residuals import RelativeResidual, log_residual
 from ..squares.stage_residuals import finishing_residuals
 from ..tolerances import AT_NOISE, NOISY, VISIBLE
 from .keep_user_values import Judged, Kept, keep_values
@@ -139,21 +128,17 @@ class RecordedRoute:
         task, scene, renderer = self._task, self._scene, self._renderer
         glance = partial(self.verification.glance, elsewhere=task.light) if self._alone else None
         course = Course(renderer, self.stages, task.listener, task.should_stop, task.began, glance)
-        setting = Setting(scene, task.light, task.mask, self._plan, task.settings.seed, course, task.clipped)
-        started = (
-            start_from_nothing(setting, _censored(log_residual, task))
-            if self._begin is None
-            else Started(None, (self._begin,), None)
-        )
+        setting = Setting(
+            scene, task.light, task.mask, self._plan, task.settings.seed, course, task.clipped,
+            None if task.linear else task.view,
+        )  # fmt: skip
+        started = start_from_nothing(setting) if self._begin is None else Started(None, (self._begin,), None)
         first, *others = started.basins
         if task.should_stop():
             choose = self._choose_by(self._judge(blurred=False).value)
             return RouteEnds((End("start", first),), 1, choose, tuple(course.reports), tuple(scene.needs.notes))
 
-        if setting.sampled:
-            end = refine_sampled(setting, started.basins, _censored(RelativeResidual, task), _weighted(task))
-        else:
-            end = refine_exact(setting, started, _censored(log_residual, task))
+        end = refine_sampled(setting, started.basins) if setting.sampled else refine_exact(setting, started)
         end = replace(end, refined=end.refined.near(setting.table, setting.user))
         del started  # and with it the first recording
         weighted = setting.sampled
@@ -219,18 +204,17 @@ class RecordedRoute:
         task, sheet = self._task, self._task.sheet
         if sheet is None or task.should_stop():
             return None
-        recording, table = end.recording.whole, end.recording.setting.table
+        recording, setting = end.recording.whole, end.recording.setting
         groups = recording.tiles(TILE)
         noise = recording.noise(recording.pixels(kept.x), TILE)
         some = np.arange(0, len(groups), max(len(groups) // (TILES_OF_A_PICTURE * len(sheet)), 1))
         groups, noise = groups.take(some), noise.take(some)
-        weigh = recording.weighing(noise, TILE, _weighted(task))
-        solved, judged = (recording.problem(groups, make) for make in (_censored(RelativeResidual, task), weigh))
+        makers = setting.censored(RelativeResidual), recording.weighing(noise, TILE)
+        solved, judged = (recording.problem(groups, make) for make in makers)
         judged = replace(judged, evaluate=solved.evaluate)  # which remembers what it was asked
         numbers = sheet.numbers(groups.pixels[groups.first[:-1]])
-        return contradiction(
-            solved, judged, numbers, sheet.labels, kept.x, (table.lower, table.upper), task.should_stop
-        )
+        box = setting.table.lower, setting.table.upper
+        return contradiction(solved, judged, numbers, sheet.labels, kept.x, box, task.should_stop)
 
     def _perceptual(
         self, end: OnRecording, kept: Kept, others: Sequence[Vector]
@@ -238,20 +222,16 @@ class RecordedRoute:
         """The ends of the perceptual stages where these have something to do, sentences, and what a picture counts."""
         task, plan, settings = self._task, self._plan, self._task.settings
         setting, problem, noise = end.recording.setting, end.refined.all, end.noise
-
-        def misfit() -> Callable[[Pixels], float]:
-            return _misfit(end, _censored(log_residual, task))
-
         if not self._finishing:
-            return [], [], misfit()
+            return [], [], _misfit(end)
         if settings.losses is None and task.linear:
             # under lights with extent residuals are in deviations of the noise
             left = np.inf if setting.sampled else float(np.sqrt(2.0 * problem.equations(kept.x).cost))
             if left < plan.seen_rms:
-                return [], [NOTHING_SEEN.format(100 * left)], misfit()
+                return [], [NOTHING_SEEN.format(100 * left)], _misfit(end)
             deviations, noise = end.recording.whole.misfit(kept.x)
             if deviations < AT_NOISE:
-                return [], [NOTHING_BUT_NOISE.format(100 * noise.level)], misfit()
+                return [], [NOTHING_BUT_NOISE.format(100 * noise.level)], _misfit(end)
         may_blur = task.linear and settings.losses is None
         judge = self._judge(blurred=may_blur and (setting.sampled or (noise is not None and noise.level > NOISY)))
         box = box_holding(setting.table, setting.user, kept.held)
@@ -290,31 +270,11 @@ class RecordedRoute:
         return lambda images: Choice.of([error(i) if np.isfinite(i).all() else np.inf for i in images])
 
 
-def _censored(make: MakeResidual, task: FitTask) -> MakeResidual:
-    """Residuals that expect no more of clipped pixels than a display shows."""
-    view = task.view
-    if task.linear:
-        return make
-    if isinstance(view, BakedView):
-        return lambda target: DisplayedResidual(view, target)
-    assert isinstance(view, DisplayView)
-    limit = 2.0**-view.exposure_ev
-    return lambda target: CensoredResidual(make(target), target, limit)
-
-
-def _weighted(task: FitTask) -> MakeWeighted:
-    """Residuals in standard deviations of the noise."""
-    view = task.view
-    if not task.linear and isinstance(view, BakedView):
-        return lambda target, weight: WeightedDisplayedResidual(view, target, weight)
-    return lambda target, weight: _censored(lambda t: WeightedResidual(t, weight), task)(target)
-
-
-def _misfit(end: OnRecording, compressed: MakeResidual) -> Callable[[Pixels], float]:
+def _misfit(end: OnRecording) -> Callable[[Pixels], float]:
     """The least-squares measure of a path-traced picture: of the last problem where it knows the noise, else in log."""
     setting, problem = end.recording.setting, end.refined.all
     residual, groups = problem.residual, problem.groups
     if not setting.sampled:
         groups = end.recording.paths.tile_groups()
-        residual = compressed(groups.average(setting.reference))
+        residual = setting.censored(log_residual)(groups.average(setting.reference))
     return lambda image: float(np.sqrt(np.mean(residual(groups.average(image))[0] ** 2)))

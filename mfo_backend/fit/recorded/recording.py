@@ -9,6 +9,8 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
+from ...metrics.display.baked_view import BakedView
+from ...metrics.display.tone_mapping import DisplayView, View
 from ...render.camera.primary_rays import TILE
 from ...render.paths.recorded_image import RECALLED, RecordedImage
 from ...render.paths.recorded_paths import LaneGroups, RecordedPaths
@@ -20,7 +22,16 @@ from ..plans import RecordedPlan
 from ..random_streams import Stream
 from ..result.course import Course
 from ..squares.problem import Problem
-from ..squares.residuals import MakeResidual, MakeWeighted, OneSidedResidual, WeightedResidual
+from ..squares.residuals import (
+    CensoredResidual,
+    DisplayedResidual,
+    MakeResidual,
+    OneSidedResidual,
+    Residual,
+    Rows,
+    WeightedDisplayedResidual,
+    WeightedResidual,
+)
 from ..tolerances import MODEL_ERROR
 from .reference_noise import TileNoise, tile_noise
 from .where_to_look import all_groups, detail_grid, without_fireflies
@@ -40,6 +51,8 @@ class Setting:
         Pixels that see the target, True (height, width).
     clipped
         1 where the radiance is only known to be the reference's or more, else 0; None where it is known everywhere.
+    display
+        The view of a display-encoded reference; None for a linear one.
     """
 
     scene: RecordedScene | RecordedSheet
@@ -49,6 +62,7 @@ class Setting:
     seed: int
     course: Course
     clipped: NDArray[np.float32] | None = field(default=None, repr=False)
+    display: View | None = None
 
     @cached_property
     def without_fireflies(self) -> tuple[Pixels, int]:
@@ -77,6 +91,23 @@ class Setting:
     def sampled(self) -> bool:
         """Whether light is sampled, so that a recording has noise of its own."""
         return self.scene.needs.sampled
+
+    def censored(self, make: MakeResidual) -> MakeResidual:
+        """Residuals that expect no more of clipped pixels than a display shows."""
+        view = self.display
+        if view is None:
+            return make
+        if isinstance(view, BakedView):
+            return lambda target: DisplayedResidual(view, target)
+        assert isinstance(view, DisplayView)
+        limit = 2.0**-view.exposure_ev
+        return lambda target: CensoredResidual(make(target), target, limit)
+
+    def weighted(self, target: Rows, weight: Rows) -> Residual:
+        """The residual in standard deviations of the noise; `weight` is one over these."""
+        if isinstance(self.display, BakedView):
+            return WeightedDisplayedResidual(self.display, target, weight)
+        return self.censored(lambda t: WeightedResidual(t, weight))(target)
 
     def record(
         self,
@@ -186,11 +217,11 @@ class Recording:
         paths = self.paths
         return tile_noise(self.setting.calm, pixels, paths, self.tiles(side), paths.interior, side)
 
-    def weighing(self, noise: TileNoise, side: int, weigh: MakeWeighted = WeightedResidual) -> MakeResidual:
+    def weighing(self, noise: TileNoise, side: int) -> MakeResidual:
         """Residuals of tiles of this side, or of some of them, in standard deviations of their `noise`."""
         least = MODEL_ERROR * float(self.tiles(side).average(self.setting.reference).mean())
         weight = (1.0 / np.hypot(noise.deviation, max(least, 1e-12))).astype(np.float32)
-        return lambda target: weigh(target, weight)
+        return lambda target: self.setting.weighted(target, weight)
 
     def misfit(self, x: Vector) -> tuple[float, TileNoise]:
         """Root mean square difference of the tiles from the reference, in standard deviations of the noise, and that

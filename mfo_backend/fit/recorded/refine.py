@@ -16,7 +16,7 @@ from ..alike.unneeded_lobes import solve_without_unneeded
 from ..plans import NEAR_EVALUATIONS
 from ..result.course import Stage
 from ..squares.problem import Refined
-from ..squares.residuals import MakeResidual, MakeWeighted
+from ..squares.residuals import log_residual
 from .recording import SAMPLES, Recording, Setting, Vector
 from .reference_noise import TileNoise
 from .solve import better_basin, solve
@@ -51,7 +51,7 @@ class OnRecording:
     noise: TileNoise | None = None
 
 
-def refine_exact(setting: Setting, started: Started, make: MakeResidual) -> OnRecording:
+def refine_exact(setting: Setting, started: Started) -> OnRecording:
     """The end where every light is exact, and so every recording as good as another of as many rays."""
     recording, start = started.recording, started.basins[0]
     assert recording is not None
@@ -65,7 +65,7 @@ def refine_exact(setting: Setting, started: Started, make: MakeResidual) -> OnRe
             stage.picture = recording.preview
         groups = all_groups(recording.paths, 1, setting.reference)
         groups = fewer_groups(groups, setting.reference, setting.plan.refine_lanes)
-        problem = recording.problem(groups, make)
+        problem = recording.problem(groups, setting.censored(log_residual))
 
         def solve_below(x: Vector, wanted: float) -> Solution:
             return solve(setting, problem, x, setting.plan.other_evaluations, stage=stage, wanted=wanted)
@@ -77,27 +77,26 @@ def refine_exact(setting: Setting, started: Started, make: MakeResidual) -> OnRe
     return _with_width_rivals(OnRecording(Refined(found.x, problem, problem, rivals=rivals), recording))
 
 
-def refine_sampled(setting: Setting, basins: Sequence[Vector], make: MakeResidual, weigh: MakeWeighted) -> OnRecording:
+def refine_sampled(setting: Setting, basins: Sequence[Vector]) -> OnRecording:
     """The end where light is sampled, on a new and finer recording near it.
 
-    There, residuals count in standard deviations of the reference's noise by `weigh`. Solutions in other
-    basins, all but the first of `basins`, are tried again: they may have cost more by the noise of the first recording
-    alone.
+    There, residuals count in standard deviations of the reference's noise. Solutions in other basins, all but the first
+    of `basins`, are tried again: they may have cost more by the noise of the first recording alone.
     """
     start, *others = basins
     with setting.course.stage("refine") as stage:
-        recording, x, grid = _recorded_near(setting, stage, start, make, weigh, 0)
+        recording, x, grid = _recorded_near(setting, stage, start, 0)
         stage.vector = x
         # the first weights came from a model that was still off
-        found = _problems(recording, x, make, weigh, solve_all=True)
+        found = _problems(recording, x, solve_all=True)
         alike = setting.plan.alike
         others = [*others, *(taken_for(x, setting.table) if alike else ())]
         rival = better_basin(setting, found.refined.few, x, others, significant=alike)
         if rival is not None:
             known, number = found.refined.few.equations(x).cost, recording.number
             del found, recording
-            recording, better, _ = _recorded_near(setting, stage, rival, make, weigh, number)
-            found = _problems(recording, better, make, weigh, solve_all=True)
+            recording, better, _ = _recorded_near(setting, stage, rival, number)
+            found = _problems(recording, better, solve_all=True)
             if found.refined.few.equations(better).cost >= known:
                 # what had made it look better was the noise of a recording for another material
                 number = recording.number
@@ -105,20 +104,13 @@ def refine_sampled(setting: Setting, basins: Sequence[Vector], make: MakeResidua
                 stage.picture = None
                 recording = setting.record(x, grid, number + 1)
                 stage.picture = recording.preview
-                found = _problems(recording, x, make, weigh, solve_all=True)
+                found = _problems(recording, x, solve_all=True)
         refined = _last_steps(setting, stage, found.refined)
         stage.vector = refined.x
     return _with_width_rivals(replace(found, refined=refined))
 
 
-def _recorded_near(
-    setting: Setting,
-    stage: Stage,
-    start: Vector,
-    make: MakeResidual,
-    weigh: MakeWeighted,
-    number: int,
-) -> tuple[Recording, Vector, int]:
+def _recorded_near(setting: Setting, stage: Stage, start: Vector, number: int) -> tuple[Recording, Vector, int]:
     """A recording made anew until it is near the solution on some of its tiles, that solution, and its grid.
 
     `number` is how many recordings there were before.
@@ -131,7 +123,7 @@ def _recorded_near(
         stage.picture = None  # it holds the recording before this one
         recording = setting.record(start, grid, number)
         stage.picture = recording.preview
-        few = _problems(recording, start, make, weigh).refined.few
+        few = _problems(recording, start).refined.few
         x = solve(setting, few, start, NEAR_EVALUATIONS, stage=stage).x
         before, after = few.own_noise(start), few.own_noise(x)
         moved = _is_old(few.change(start, x), setting.scene.needs.indirect) or after > NOISIER * before
@@ -147,10 +139,8 @@ def _is_old(change: float, indirect: float) -> bool:
     return change > MOVED or change * indirect / (1.0 + indirect) > OWN_LIGHT
 
 
-def _problems(
-    recording: Recording, x: Vector, make: MakeResidual, weigh: MakeWeighted, *, solve_all: bool = False
-) -> OnRecording:
-    """All tiles of the last stage and some of them; `weigh` weighs by the noise that the model `x` leaves.
+def _problems(recording: Recording, x: Vector, *, solve_all: bool = False) -> OnRecording:
+    """All tiles of the last stage and some of them, weighted by the noise that the model `x` leaves.
 
     With `solve_all`, the picture for that noise brings all tiles' derivatives at `x`, where their solve begins.
     """
@@ -159,7 +149,7 @@ def _problems(
     some = np.arange(0, len(groups), max(len(groups) // plan.first_tiles, 1))
     pixels = recording.pixels_and_tiles(x, groups) if solve_all else recording.pixels(x)
     noise = recording.noise(pixels, side)
-    weighing, fewer = (recording.weighing(n, side, weigh) for n in (noise, noise.take(some)))
+    weighing, fewer = (recording.weighing(n, side) for n in (noise, noise.take(some)))
     problem = recording.problem(groups, weighing, near=x)
     few = problem if len(some) == len(groups) else recording.problem(groups.take(some), fewer, near=x)
     return OnRecording(Refined(x, problem, few), recording, noise)

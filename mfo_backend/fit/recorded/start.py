@@ -18,7 +18,7 @@ from ..result.course import Stage
 from ..search.global_start import ROUGHER_WIDTH, agreeing_ends, best_starts, random_start, scan
 from ..search.race_starts import race
 from ..squares.problem import Problem
-from ..squares.residuals import MakeResidual
+from ..squares.residuals import log_residual
 from .recording import Recording, Setting, Vector
 from .solve import solve
 from .texture_scales import Placed, best_scales, placed
@@ -46,7 +46,7 @@ class Started:
     edges: NDArray[np.bool_] | None
 
 
-def start_from_nothing(setting: Setting, make: MakeResidual) -> Started:
+def start_from_nothing(setting: Setting) -> Started:
     """Solutions from the scan's nodes, the scene's material and a random one.
 
     Raises
@@ -54,7 +54,7 @@ def start_from_nothing(setting: Setting, make: MakeResidual) -> Started:
     UnrecordableError
         If no start gives finite numbers.
     """
-    plan, course = setting.plan, setting.course
+    plan, course, make = setting.plan, setting.course, setting.censored(log_residual)
     with course.stage("scan") as stage:
         recording, edges = _first_recording(setting)
         groups = _groups(recording)

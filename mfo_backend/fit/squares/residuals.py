@@ -34,7 +34,6 @@ class Residual(Protocol):
 
 
 MakeResidual = Callable[[Rows], Residual]  # from a reference
-MakeWeighted = Callable[[Rows, Rows], Residual]  # from a reference and one over the deviation of its noise
 
 
 class ResponseResidual:

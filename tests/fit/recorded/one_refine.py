@@ -18,10 +18,9 @@ def refine(renderer: Any, reference: Pixels, start: NDArray[np.float64], plan: R
     from mfo_backend.fit.recorded.recording import Setting
     from mfo_backend.fit.recorded.refine import refine_sampled
     from mfo_backend.fit.result.course import Course
-    from mfo_backend.fit.squares.residuals import RelativeResidual, WeightedResidual
     from mfo_backend.render.paths.recorded_scene import RecordedScene
 
     mask = renderer.target_mask()
     course = Course(renderer, ("refine",), lambda event: None, lambda: False, time.monotonic())
     setting = Setting(RecordedScene(renderer, int(mask.sum())), reference, mask, plan, seed, course)
-    return refine_sampled(setting, [start], RelativeResidual, WeightedResidual)
+    return refine_sampled(setting, [start])

@@ -131,11 +131,11 @@ def test_a_rival_has_to_be_better_on_a_recording_of_its_own(monkeypatch, cost_th
         recorded.append((x, grid, number))
         return SimpleNamespace(number=number, preview=None, setting=setting)
 
-    def recorded_near(setting, stage, start, make, weigh, number):
+    def recorded_near(setting, stage, start, number):
         grid = 9 if start is rival else 7
         return record(start, grid, number + 1), start, grid
 
-    def problems(recording, x, make, weigh, *, solve_all=False):
+    def problems(recording, x, *, solve_all=False):
         few = SimpleNamespace(equations=lambda at: SimpleNamespace(cost=cost_there if at is rival else 0.5))
         return refine_module.OnRecording(Refined(x, few, few), recording)
 
@@ -150,7 +150,7 @@ def test_a_rival_has_to_be_better_on_a_recording_of_its_own(monkeypatch, cost_th
     monkeypatch.setattr(refine_module, "_problems", problems)
     monkeypatch.setattr(refine_module, "better_basin", lambda setting, problem, x, others, significant: rival)
     monkeypatch.setattr(refine_module, "_last_steps", lambda setting, stage, refined: refined)
-    end = refine_module.refine_sampled(setting, [found, rival], None, None)
+    end = refine_module.refine_sampled(setting, [found, rival])
     assert end.refined.x is (rival if kept == "rival" else found)
     assert recorded[-1] == ((rival, 9, 2) if kept == "rival" else (found, 7, 3))
     assert end.recording.number == recorded[-1][2]
