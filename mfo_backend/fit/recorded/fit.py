@@ -141,8 +141,7 @@ class RecordedRoute:
         end = refine_sampled(setting, started.basins) if setting.sampled else refine_exact(setting, started)
         end = replace(end, refined=end.refined.near(setting.table, setting.user))
         del started  # and with it the first recording
-        weighted = setting.sampled
-        kept = keep_values(end, weighted=weighted, seen=None if weighted else self._judge(blurred=False).value)
+        kept = keep_values(end, None if setting.sampled else self._judge(blurred=False).value)
         disagree = self._contradiction(end, kept)
         later, notes, counts = self._perceptual(end, kept, others)
         notes = [*scene.needs.notes, *notes]
@@ -188,7 +187,7 @@ class RecordedRoute:
             Doubt(rival, (rival.x - kept.x) / setting.table.width, compare(end.refined.all, kept.x, rival.x))
             for rival in end.refined.rivals
         )
-        judged = Judged(setting, end.refined, setting.sampled)
+        judged = Judged(setting, end.refined)
         evidence = Evidence(*judged.rows(kept.x), judged.model_error, pictures)
         known = Known(kept.x, kept.spread, wanted, evidence, self._views(), doubts)
         return next_picture(scene, known, task.candidates, Stream.NEXT_PICTURE.seed(task.settings.seed))

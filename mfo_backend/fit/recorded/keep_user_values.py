@@ -42,24 +42,24 @@ class Kept:
     notes: tuple[str, ...]
 
 
-def keep_values(end: OnRecording, *, weighted: bool, seen: Callable[[Pixels], float] | None = None) -> Kept:
+def keep_values(end: OnRecording, seen: Callable[[Pixels], float] | None = None) -> Kept:
     """The refined vector with unneeded lobes switched off again and undetermined values given back.
 
-    `weighted` says that the problem's residuals are in standard deviations of the noise. Others have a floor, below
-    which a change may be seen all the same: `seen`, the mean error of a picture to the eye, must not grow either.
+    Where light is sampled residuals are in standard deviations of the noise. Others have a floor, below which a change
+    may be seen all the same: `seen`, the mean error of a picture to the eye, must not grow either.
     """
     setting, refined = end.recording.setting, end.refined
     table, user = setting.table, setting.user
     found, problem = with_user_details(refined.x, user, table), refined.all
-    judged, unseen_change = Judged(setting, refined, weighted), _UnseenChange(end.recording, refined, seen)
+    judged, unseen_change = Judged(setting, refined), _UnseenChange(end.recording, refined, seen)
     cost, certainty, spread = judged(found)
     off = list(refined.off)
     if not off:
-        least = 0.0 if weighted else MODEL_ERROR
-        off = unneeded_lobes(problem.equations(found), problem.independent, found, user, table, least)
+        equations, least = problem.equations(found), judged.model_error
+        off = unneeded_lobes(equations, problem.independent, found, user, table, least)
     moved = moved_to_user(off, found, user, table)
     if moved:
-        allowed = cost + SIGNIFICANT * len(moved) * judged.noise(cost) / problem.independent
+        allowed = cost + SIGNIFICANT * len(moved) * max(cost, judged.model_error**2) / problem.independent
         simpler = _solve_holding(setting, refined, found, off)
         simpler = None if simpler is None else with_user_details(simpler, user, table)
         if simpler is not None and (again := judged(simpler))[0] <= allowed + 1e-12 and unseen_change(simpler):
@@ -107,8 +107,8 @@ def _sets_to_return(
 class Judged:
     """Mean square residual, certainty and covariance at a vector."""
 
-    def __init__(self, setting: Setting, refined: Refined, weighted: bool) -> None:
-        self._setting, self._problem, self._weighted, self._rivals = setting, refined.all, weighted, refined.rivals
+    def __init__(self, setting: Setting, refined: Refined) -> None:
+        self._setting, self._problem, self._rivals = setting, refined.all, refined.rivals
 
     def __call__(self, x: Vector) -> tuple[float, dict[str, Certainty], NDArray[np.float64]]:
         """All of them."""
@@ -120,8 +120,8 @@ class Judged:
 
     @property
     def model_error(self) -> float:
-        """The least error of a residual."""
-        return 0.0 if self._weighted else MODEL_ERROR
+        """The least error of a residual; deviations of the noise hold it."""
+        return 0.0 if self._setting.sampled else MODEL_ERROR
 
     def rows(self, x: Vector) -> tuple[NDArray[np.float64], NDArray[np.float64] | None]:
         """Residuals and derivatives (g, 3, 1 + k) that certainty is taken from, and the recording's noise in them."""
@@ -129,13 +129,9 @@ class Judged:
 
     def _rows_of(self, evaluate: RecordedImage, x: Vector) -> tuple[NDArray[np.float64], NDArray[np.float64] | None]:
         residual = self._problem.residual
-        if not self._weighted:
+        if not self._setting.sampled:
             residual = RelativeResidual(self._problem.groups.average(self._setting.reference))
         return rows_of_samples(evaluate.samples(x), residual)
-
-    def noise(self, cost: float) -> float:
-        """Mean square of a residual that is noise."""
-        return cost if self._weighted else max(cost, MODEL_ERROR**2)
 
 
 class _UnseenChange:

@@ -158,14 +158,14 @@ def test_another_material_that_is_as_likely_is_named_and_makes_values_unsure(tmp
     truth = table.pack({name: TRUTH[name] for name in NAMES[:2]})
     end = refine(renderer, renderer.image(truth, seed=5, spp=64), truth, RecordedPlan(), 1)
     refined = end.refined
-    alone = kept_values.keep_values(end, weighted=True)
+    alone = kept_values.keep_values(end)
     assert alone.notes == ()
     assert alone.certainty["roughness"].level is Level.DETERMINED
 
     other = refined.x.copy()
     other[table.slice_of("roughness")] += 0.2
     rivals = replace(refined, rivals=(Rival(other, 0.25),))
-    doubted = kept_values.keep_values(replace(end, refined=rivals), weighted=True)
+    doubted = kept_values.keep_values(replace(end, refined=rivals))
     here = float(refined.x[table.slice_of("roughness")][0])
     assert doubted.notes == (
         f"With a probability of 25 % it is another material: roughness {here + 0.2:.2g} (not {here:.2g}).",
