@@ -7,16 +7,13 @@ are basins of their own: a quadratic around one knows nothing of the others.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from dataclasses import dataclass, replace
-from typing import Protocol
+from collections.abc import Callable, Iterator
+from dataclasses import replace
 
 import numpy as np
 
 from ...material.principled.blender_selection import AMOUNT_OF
-from ...solve.bounded_least_squares import Solution
 from ...types.parameter import ParameterTable, Vector
-from ..plans import NEAR_EVALUATIONS
 from ..squares.problem import Problem, Refined, Rival
 from ..tolerances import ANOTHER_MATERIAL, HOPELESS, SIGNIFICANT
 from .compare import compare
@@ -26,56 +23,37 @@ BASE, COAT = ("specular_ior_level", "roughness"), ("coat_weight", "coat_roughnes
 SAME_F0 = 2.0  # Specular IOR Level 0.5 reflects what a coat of weight 1 and the same index does (Blender 4.0)
 
 
-class Solve(Protocol):
-    """A bounded solve of a problem from a start, given up where it promises no less than the `wanted` cost."""
-
-    def __call__(self, problem: Problem, start: Vector, evaluations: int, *, box: Box, wanted: float) -> Solution:
-        """Its solution, which may cost more than is wanted."""
-        ...
-
-
-@dataclass(frozen=True)
-class SimplestEnd:
-    """The material chosen, the names of values held at the user's in it, and what else it might be.
-
-    `richer` are materials with more lobes that the recording alone prefers by a chi squared that noise does not
-    explain, if from a few tiles: pictures of their own have to say whether an eye sees it.
-    """
-
-    end: Solution
-    off: tuple[str, ...]
-    rivals: tuple[Rival, ...] = ()
-    richer: tuple[Vector, ...] = ()
+Solve = Callable[[Problem, Vector, Box], Vector]  # where a few bounded steps from a start end
 
 
 class OtherEnds:
     """Solutions in other basins than that of a fit's last problem."""
 
-    def __init__(self, refined: Refined, solve: Solve, user: Vector, table: ParameterTable) -> None:
-        self._few, self._all, self._solve, self._user, self._table = refined.few, refined.all, solve, user, table
+    def __init__(self, solve: Solve, user: Vector, table: ParameterTable) -> None:
+        self._solve, self._user, self._table = solve, user, table
 
-    def simplest(self, found: SimplestEnd) -> SimplestEnd:
+    def simplest(self, found: Refined) -> Refined:
         """What the picture does not tell from `found`: with base and coat exchanged, without lobes that are new."""
         return self._without_lobes(self._exchanged(found))
 
-    def _exchanged(self, found: SimplestEnd) -> SimplestEnd:
+    def _exchanged(self, found: Refined) -> Refined:
         """With the highlights of base and coat exchanged, where that is better, or as good and nearer to the user's."""
-        x, table = found.end.x, self._table
+        x, table = found.x, self._table
         if not exchangeable(table) or COAT[0] in found.off or is_off(COAT[0], x, table):
             return found
         box = box_holding(table, self._user, found.off)
-        end = self._attempt(found.end, np.clip(exchanged(x, table), *box), box)
-        if end is None or table.apart(end.x, x) < ANOTHER_MATERIAL:
+        end = self._attempt(found, np.clip(exchanged(x, table), *box), box)
+        if end is None or table.apart(end, x) < ANOTHER_MATERIAL:
             return found
-        if is_off(COAT[0], end.x, table) and COAT[0] in values_off(table, self._user):
+        if is_off(COAT[0], end, table) and COAT[0] in values_off(table, self._user):
             return found  # which is simpler: `_without_lobes` comes there, too
-        it = compare(self._all, x, end.x)
-        away, was = (np.linalg.norm((at - self._user) / table.width) for at in (end.x, x))
+        it = compare(found.all, x, end)
+        away, was = (np.linalg.norm((at - self._user) / table.width) for at in (end, x))
         if it.more / it.inflation < -SIGNIFICANT or (away < was and it.more < SIGNIFICANT):
-            return replace(found, end=end, rivals=(*found.rivals, Rival(x, 1.0 - it.better)))
-        return replace(found, rivals=(*found.rivals, Rival(end.x, it.better)))
+            return replace(found, x=end, rivals=(*found.rivals, Rival(x, 1.0 - it.better)))
+        return replace(found, rivals=(*found.rivals, Rival(end, it.better)))
 
-    def _without_lobes(self, found: SimplestEnd) -> SimplestEnd:
+    def _without_lobes(self, found: Refined) -> Refined:
         """Without the lobes that `found` has and the user's material lacks, where no more than chance is against it.
 
         All of them together, else one after another: a metal may be asked for and its tint not.
@@ -89,27 +67,27 @@ class OtherEnds:
                 found = self._without(found, [name]) or found
         return found
 
-    def _is_new(self, name: str, found: SimplestEnd) -> bool:
+    def _is_new(self, name: str, found: Refined) -> bool:
         """Whether `found` has this lobe; a detail of a lobe that is off is none."""
-        x, table = found.end.x, self._table
+        x, table = found.x, self._table
         amount = AMOUNT_OF.get(name)
         if amount in table.names and is_off(amount, x, table):
             return False
         return name not in found.off and not is_plain(name, x, table)
 
-    def _without(self, found: SimplestEnd, lobes: list[str]) -> SimplestEnd | None:
+    def _without(self, found: Refined, lobes: list[str]) -> Refined | None:
         """`found` without these lobes; None where more than chance is against it.
 
         Each of them counts three standard deviations against a material: what it would need to come in alone.
         """
-        x = found.end.x
+        x = found.x
         off, price = (*found.off, *lobes), SIGNIFICANT * len(lobes)
         box = box_holding(self._table, self._user, off)
         starts = [np.clip(start, *box) for start in self._without_coat(x, lobes)]
-        end = self._attempt(found.end, min(starts, key=lambda start: self._few.equations(start).cost), box)
+        end = self._attempt(found, min(starts, key=lambda start: found.few.equations(start).cost), box)
         if end is None:
             return None
-        it = compare(self._all, x, end.x)
+        it = compare(found.all, x, end)
         against = it.more / it.inflation - price
         if against > 0.0:
             return None
@@ -117,25 +95,23 @@ class OtherEnds:
         others = [Rival(rival.x, share * rival.share) for rival in found.rivals]
         rest = share - sum(rival.share for rival in others)
         richer = (*found.richer, x) if it.more > HOPELESS else found.richer
-        return SimplestEnd(end, off, (*others, Rival(x, rest)), richer)
+        return replace(found, x=end, off=off, rivals=(*others, Rival(x, rest)), richer=richer)
 
     def _without_coat(self, x: Vector, lobes: list[str]) -> Iterator[Vector]:
         yield x
         if COAT[0] in lobes and exchangeable(self._table):
             yield coat_to_base(x, self._table)
 
-    def _attempt(self, found: Solution, start: Vector, box: Box) -> Solution | None:
+    def _attempt(self, found: Refined, start: Vector, box: Box) -> Vector | None:
         """The end of another solve on all tiles, first tried on some of them; None where it is hopeless.
 
         A few tiles with fireflies do not make it so.
         """
-        end: Solution | None = None
-        for problem in (self._all,) if self._few is self._all else (self._few, self._all):
-            end = self._solve(problem, start, NEAR_EVALUATIONS, box=box, wanted=np.inf)
-            if not compare(problem, found.x, end.x).common <= HOPELESS:
+        for problem in (found.all,) if found.few is found.all else (found.few, found.all):
+            start = self._solve(problem, start, box)
+            if not compare(problem, found.x, start).common <= HOPELESS:
                 return None
-            start = end.x
-        return end
+        return start
 
 
 def exchanged(x: Vector, table: ParameterTable) -> Vector:

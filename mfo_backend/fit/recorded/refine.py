@@ -11,11 +11,11 @@ import numpy as np
 
 from ...solve.bounded_least_squares import Solution
 from ..alike.exchanges import best_basin, metal_rivals, taken_for, width_rivals
-from ..alike.simplest import OtherEnds, SimplestEnd
-from ..alike.unneeded_lobes import solve_without_unneeded
+from ..alike.simplest import OtherEnds
+from ..alike.unneeded_lobes import Box, solve_without_unneeded
 from ..plans import NEAR_EVALUATIONS
 from ..result.course import Stage
-from ..squares.problem import Refined
+from ..squares.problem import Problem, Refined
 from ..squares.residuals import log_residual
 from .recording import SAMPLES, Recording, Setting, Vector
 from .reference_noise import TileNoise
@@ -157,14 +157,16 @@ def _problems(recording: Recording, x: Vector, *, solve_all: bool = False) -> On
 
 def _last_steps(setting: Setting, stage: Stage, refined: Refined) -> Refined:
     """The solution on all tiles without lobes nobody asks for."""
-    x, problem, table = refined.x, refined.all, setting.table
+    x, problem, table, user = refined.x, refined.all, setting.table, setting.user
+
+    def other_end(problem: Problem, start: Vector, box: Box) -> Vector:
+        return solve(setting, problem, start, NEAR_EVALUATIONS, stage=stage, box=box, wanted=np.inf).x
+
     found, off = solve_without_unneeded(
         lambda start, box: solve(setting, problem, start, NEAR_EVALUATIONS, stage=stage, box=box),
-        problem.equations(x), problem.independent, x, setting.user, table,
+        problem.equations(x), problem.independent, x, user, table,
     )  # fmt: skip
-    others = OtherEnds(refined, partial(solve, setting, stage=stage), setting.user, table)
-    last = others.simplest(SimplestEnd(found, off))
-    return replace(refined, x=last.end.x, off=last.off, rivals=last.rivals, richer=last.richer)
+    return OtherEnds(other_end, user, table).simplest(replace(refined, x=found.x, off=off))
 
 
 def _with_width_rivals(found: OnRecording) -> OnRecording:

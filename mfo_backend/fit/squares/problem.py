@@ -89,7 +89,9 @@ class Refined:
     """A vector, the problem it solves, and the same for some of the groups, evenly spread: for trials.
 
     `off` names values that were held at the user's, which are off, because the picture does not ask for them; `rivals`
-    are other materials that explain it about as well, and `richer` those of them that pictures have to be asked about.
+    are other materials that explain it about as well. `richer` are those of them with more lobes that the recording
+    alone prefers by a chi squared that noise does not explain, if from a few tiles: pictures of their own have to say
+    whether an eye sees it.
     """
 
     x: Vector
