@@ -6,7 +6,6 @@ from __future__ import annotations
 import time
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
-from functools import partial
 from typing import Any, Protocol
 
 from ..metrics.display.tone_mapping import View
@@ -22,13 +21,11 @@ from ..types.result import FitResult
 from ..types.status import Status
 from .candidates import NOTHING_ELSE, Candidates
 from .judge.fit_task import FitTask, check_task
-from .judge.judged_result import judged_result
 from .judge.mirror_end import smoothest
 from .judge.model_gap import with_gap
-from .judge.picture_errors import picture_errors
 from .judge.verification import Verification, VerifiedEnd, Verifier
 from .paper.fit import PaperRoute
-from .pictures.each_picture import SheetJudge
+from .pictures.each_picture import TaskJudge
 from .plans import RecordedPlan
 from .random_streams import Stream
 from .recorded.fit import RecordedRoute
@@ -118,11 +115,11 @@ def recover_material(
         If no route of the preset holds the material, and it may not be handed over.
     """
     task = check_task(renderer, reference, settings, display, listener, should_stop)
-    task = replace(task, nearer_than=nearer_than, candidates=candidates)
+    task = replace(task, nearer_than=nearer_than, candidates=candidates, noted=noted)
     reasons: list[str] = []
     for make, why in _ways(task, plan, begin, recorded, hand_over=hand_over):
         try:
-            return _fit_along(make(), task, reasons, why, noted=noted, judged=judged)
+            return _fit_along(make(), task, reasons, why, judged=judged)
         except UnrecordableError as error:
             reasons.append(str(error))
     if task.sheet is not None:
@@ -161,9 +158,7 @@ def _ways(
         )
 
 
-def _fit_along(
-    route: Route, task: FitTask, reasons: Sequence[str], says: _Says, *, noted: bool, judged: bool
-) -> FitOutcome:
+def _fit_along(route: Route, task: FitTask, reasons: Sequence[str], says: _Says, *, judged: bool) -> FitOutcome:
     """Fit, verify the ends by new random numbers, choose the best, and make the result.
 
     `reasons` say why the routes before this one could not do it.
@@ -183,21 +178,19 @@ def _fit_along(
         task.listener(Preview(pictures[best].image))
     first, end = pictures[0], pictures[best]
     task = task.only_counted(end.image)
-    each = None if task.sheet is None else SheetJudge(task, task.sheet, first.image, end.image)
+    judge = TaskJudge(task, first.image, end.image)
     result = final_result(
         renderer,
         found,
         choice,
         status=Status.CANCELLED if task.should_stop() else status,
-        errors=picture_errors(task.reference, first.image, end.image, task.mask, task.counted, task.display)
-        if each is None
-        else each.mean_errors,
+        errors=judge.errors,
         began=task.began,
         notes=[" ".join([*reasons, says(route.stages)])] if reasons else [],
     )
     if not judged:
         return FitOutcome(result, first.image, end.image, task.counted)
-    return _judged(task, result, first, end, each, noted=noted)
+    return _judged(task, result, first, end, judge)
 
 
 def _verified(verification: Verifier, start: Callable[[], Any], found: RouteEnds) -> tuple[Status, Sequence[Candidate]]:
@@ -244,19 +237,14 @@ def _halves(task: FitTask, end: Candidate) -> tuple[Pixels, Pixels] | None:
     return first, second
 
 
-def _judged(
-    task: FitTask, result: FitResult, first: Candidate, end: Candidate, each: SheetJudge | None, *, noted: bool
-) -> FitOutcome:
+def _judged(task: FitTask, result: FitResult, first: Candidate, end: Candidate, judge: TaskJudge) -> FitOutcome:
     """The result with what its pictures say of it, from the start where the end is visibly worse.
 
     All verdicts on a result belong here: reference, result and two pictures of it with independent noise are at hand.
     """
     stopped = result.status is Status.CANCELLED or task.should_stop()
     if not stopped:
-        result, shown = judged_result(
-            result, task.reference, first.image, end.image, task.mask, task.view, noted=noted,
-            judge_all=None if each is None else partial(each.results, noted=noted),
-        )  # fmt: skip
+        result, shown = judge.judged(result)
         end = first if shown is first.image else end  # the gap below is that of what is shown
     halves = _halves(task, end)
     if halves is not None and not stopped:

@@ -246,6 +246,7 @@ def phases_of(job: Path) -> dict[str, Any]:
     from mfo_backend.fit import recover_material
     from mfo_backend.fit.judge.picture_judge import PictureJudge
     from mfo_backend.fit.judge.verification import Verification
+    from mfo_backend.fit.pictures import each_picture
     from mfo_backend.fit.recorded.fit import RecordedRoute
     from mfo_backend.job.output.progress import EventWriter
     from mfo_backend.job.run import run_job
@@ -260,7 +261,7 @@ def phases_of(job: Path) -> dict[str, Any]:
     stages.wrap(RecordedRoute, "fit", "solve")
     stages.wrap(RecordedScene, "_probe", "record")
     stages.wrap(RecordedScene, "record", "record")
-    for owner, name in ((recover_material, "picture_errors"), (PictureJudge, "value"), (recover_material, "_judged")):
+    for owner, name in ((each_picture, "picture_errors"), (PictureJudge, "value"), (recover_material, "_judged")):
         stages.wrap(owner, name, "verify")
     stages.wrap(run_job, "write_outputs", "write")
     for name in ("pictures", "finished"):

@@ -47,6 +47,8 @@ class FitTask:
         FLIP beyond noise that a fit from another class has to come below; None where there is none before it.
     candidates
         The scene's other cameras and lights, from which a further picture could be.
+    noted
+        Whether the export has left something out, which may be why a result does not match.
     """
 
     renderer: Renderer
@@ -63,6 +65,7 @@ class FitTask:
     began: float
     nearer_than: float | None = None
     candidates: Candidates = field(default_factory=Candidates)
+    noted: bool = False
 
     @property
     def sheet(self) -> ContactSheet | None:

@@ -5,7 +5,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from functools import partial
 
 import numpy as np
 
@@ -15,11 +14,9 @@ from ...types.image import Image, Pixels
 from ...types.result import FitResult
 from ...types.status import Status
 from ..judge.fit_task import FitTask, check_task
-from ..judge.judged_result import judged_result
 from ..judge.model_gap import with_gap
-from ..judge.picture_errors import picture_errors
 from ..judge.verification import MOST_WHOLE, SHOWN_SAMPLES
-from ..pictures.each_picture import SheetJudge
+from ..pictures.each_picture import TaskJudge
 from ..random_streams import Stream
 from ..result.outcome import FitOutcome
 from .evened_light import LOOK_SAMPLES
@@ -75,9 +72,8 @@ def fit_together(
         If it was asked to stop before one of them had been fitted.
     """
     recorded = check_members(members, reference)
-    tasks = [
-        check_task(member.renderer, reference, member.settings, display, listener, should_stop) for member in members
-    ]
+    tasks = [check_task(m.renderer, reference, m.settings, display, listener, should_stop) for m in members]
+    tasks = [replace(task, noted=noted) for task in tasks]
     begin()
     turns = take_turns(
         members, reference, tasks[0].light, recorded, display=display, listener=listener, should_stop=should_stop
@@ -85,11 +81,11 @@ def fit_together(
     starts = [member.renderer.start for member in members]
     # it only says from where the errors came
     start = np.mean(_halves(members, starts, LOOK_SAMPLES), axis=0, dtype=np.float32)
-    judged, halves = _judged_all(members, tasks, turns, start, turns.present, noted=noted)
+    judged, halves = _judged_all(members, tasks, turns, start, turns.present)
     back = [_is_back(result, before.result) for result, before in zip(judged, turns.outcomes, strict=True)]
     if any(back) and not all(back):  # the others are judged beside what they stand beside now
         kept = [s if gone else x for s, x, gone in zip(starts, turns.present, back, strict=True)]
-        again, halves = _judged_all(members, tasks, turns, start, kept, noted=noted)
+        again, halves = _judged_all(members, tasks, turns, start, kept)
         judged = [first if gone else new for first, new, gone in zip(judged, again, back, strict=True)]
     end = np.mean(halves, axis=0, dtype=np.float32)
     stopped = should_stop()
@@ -113,8 +109,6 @@ def _judged_all(
     turns: Turns,
     start: Pixels,
     vectors: Sequence[np.ndarray],
-    *,
-    noted: bool,
 ) -> tuple[list[FitResult], tuple[Pixels, Pixels]]:
     """The results by a picture of all these vectors, and its halves."""
     stopped = tasks[0].should_stop()
@@ -122,18 +116,9 @@ def _judged_all(
     end = np.mean(halves, axis=0, dtype=np.float32)
     fitted = np.any([task.mask for task in tasks], axis=0)
     judged = []
-    for whole, outcome in zip(tasks, turns.outcomes, strict=True):
-        task = whole.only_counted(end)
-        each = None if task.sheet is None else SheetJudge(task, task.sheet, start, end)
-        if each is None:
-            errors = picture_errors(task.reference, start, end, task.mask, task.counted, task.display)
-        else:
-            errors = each.mean_errors
-        result, _ = judged_result(
-            replace(outcome.result, errors=errors), task.reference, start, end, task.mask, task.view, noted=noted,
-            others=fitted, judge_all=None if each is None else partial(each.results, noted=noted, others=fitted),
-        )  # fmt: skip
-        judged.append(result)
+    for task, outcome in zip(tasks, turns.outcomes, strict=True):
+        judge = TaskJudge(task.only_counted(end), start, end)
+        judged.append(judge.judged(replace(outcome.result, errors=judge.errors), fitted)[0])
     return judged, halves
 
 

@@ -1,19 +1,20 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What a result on a contact sheet is in each of its pictures: errors and verdicts."""
+"""What the pictures of a result say of it: errors and verdicts, on a contact sheet those of each of its pictures."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass, field
-from functools import cached_property
+from functools import cached_property, partial
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ...render.sheet.contact_sheet import ContactSheet
 from ...types.image import Encoding, Image, Pixels
-from ...types.result import PictureResult
+from ...types.result import FitResult, PictureResult
 from ..judge.fit_task import FitTask
+from ..judge.judged_result import judged_result
 from ..judge.picture_errors import picture_errors
 from ..judge.verdict import judge
 
@@ -21,59 +22,70 @@ Errors = dict[str, tuple[float, float]]
 
 
 @dataclass(frozen=True)
-class SheetJudge:
-    """Looks at those pictures of a sheet that show the target; `start` and `end` are radiance over the sheet."""
+class TaskJudge:
+    """Looks at what a fit began and ended with, by pictures of radiance; of a sheet at all that show the target."""
 
     task: FitTask
-    sheet: ContactSheet
     start: Pixels = field(repr=False)
     end: Pixels = field(repr=False)
 
-    @cached_property
-    def numbers(self) -> tuple[int, ...]:
-        """The pictures that show the target, counted from 0."""
-        return tuple(n for n in range(len(self.sheet)) if self.sheet.cut(self.task.mask, n).any())
+    @property
+    def errors(self) -> Errors:
+        """Those of `judge.picture_errors`, means over the pixels of all pictures."""
+        task, each = self.task, self._errors
+        if task.sheet is None:
+            return each[0]
+        weights = [task.sheet.cut(task.counted, number).sum() for number in self._numbers]
+
+        def mean(name: str, which: int) -> float:
+            return float(np.average([errors[name][which] for errors in each], weights=weights))
+
+        return {name: (mean(name, 0), mean(name, 1)) for name in each[0]}
+
+    def judged(self, result: FitResult, others: NDArray[np.bool_] | None = None) -> tuple[FitResult, Pixels]:
+        """The result with its verdict, and its picture; see `judge.judged_result`."""
+        task = self.task
+        return judged_result(
+            result, task.reference, self.start, self.end, task.mask, task.view, noted=task.noted, others=others,
+            judge_all=None if task.sheet is None else partial(self._results, task.sheet, others),
+        )  # fmt: skip
+
+    def _results(
+        self, sheet: ContactSheet, others: NDArray[np.bool_] | None, shown: Pixels
+    ) -> tuple[PictureResult, ...]:
+        """Errors and verdict of each picture of what is `shown`, the end or the start."""
+        kept = shown is self.start
+        errors = [{n: (e[0], e[0] if kept else e[1]) for n, e in of.items()} for of in self._errors]
+        beside = [None if others is None else np.ascontiguousarray(sheet.cut(others, n)) for n in self._numbers]
+        judgements = [
+            judge(reference, light, mask, self.task.view, noted=self.task.noted, others=fitted)
+            for (reference, mask, _, (light,)), fitted in zip(self._each(shown), beside, strict=True)
+        ]
+        labels = [sheet.labels[number] for number in self._numbers]
+        return tuple(PictureResult(*each) for each in zip(labels, errors, judgements, strict=True))
 
     @cached_property
-    def errors(self) -> tuple[Errors, ...]:
-        """Those of each picture, as `judge.picture_errors` has them."""
+    def _numbers(self) -> tuple[int, ...]:
+        """The pictures that show the target, counted from 0."""
+        sheet = self.task.sheet
+        return () if sheet is None else tuple(n for n in range(len(sheet)) if sheet.cut(self.task.mask, n).any())
+
+    @cached_property
+    def _errors(self) -> tuple[Errors, ...]:
         return tuple(
             picture_errors(reference, first, last, mask, counted, self.task.display)
             for reference, mask, counted, (first, last) in self._each(self.start, self.end)
         )
 
-    @property
-    def mean_errors(self) -> Errors:
-        """Means over the pixels of all pictures."""
-        weights = [self.sheet.cut(self.task.counted, number).sum() for number in self.numbers]
-
-        def mean(name: str, which: int) -> float:
-            return float(np.average([errors[name][which] for errors in self.errors], weights=weights))
-
-        return {name: (mean(name, 0), mean(name, 1)) for name in self.errors[0]}
-
-    def results(
-        self, shown: Pixels, *, noted: bool, others: NDArray[np.bool_] | None = None
-    ) -> tuple[PictureResult, ...]:
-        """Errors and verdict of each picture of what is `shown`, the end or the start; `others` as of `judge`."""
-        kept = shown is self.start
-        errors = [{n: (e[0], e[0] if kept else e[1]) for n, e in of.items()} for of in self.errors]
-        beside = [None if others is None else np.ascontiguousarray(self.sheet.cut(others, n)) for n in self.numbers]
-        judgements = [
-            judge(reference, light, mask, self.task.view, noted=noted, others=fitted)
-            for (reference, mask, _, (light,)), fitted in zip(self._each(shown), beside, strict=True)
-        ]
-        labels = [self.sheet.labels[number] for number in self.numbers]
-        return tuple(PictureResult(*each) for each in zip(labels, errors, judgements, strict=True))
-
     def _each(self, *light: Pixels) -> Iterator[tuple[Image, NDArray[np.bool_], NDArray[np.bool_], list[Pixels]]]:
         """Reference, masks and radiance of each picture, as its reference has them."""
-        reference = self.task.reference
-        own = self.sheet.picture if reference.encoding is Encoding.LINEAR else self.sheet.cut
-        for number in self.numbers:
-            counts = None if reference.counts is None else self.sheet.cut(reference.counts, number)
+        task, reference, sheet = self.task, self.task.reference, self.task.sheet
+        if sheet is None:
+            yield reference, task.mask, task.counted, list(light)
+            return
+        own = sheet.picture if reference.encoding is Encoding.LINEAR else sheet.cut
+        for number in self._numbers:
+            counts = None if reference.counts is None else sheet.cut(reference.counts, number)
             target = Image(np.ascontiguousarray(own(reference.pixels, number)), reference.encoding, counts=counts)
-            mask, counted = (
-                np.ascontiguousarray(self.sheet.cut(m, number)) for m in (self.task.mask, self.task.counted)
-            )
+            mask, counted = (np.ascontiguousarray(sheet.cut(m, number)) for m in (task.mask, task.counted))
             yield target, mask, counted, [np.ascontiguousarray(own(pixels, number)) for pixels in light]
