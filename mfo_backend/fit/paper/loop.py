@@ -19,7 +19,7 @@ from __future__ import annotations
 import math
 import time
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -61,18 +61,6 @@ SCHEDULES = {"constant": Schedule(levels=1), "decay": Schedule(levels=4)}
 
 
 @dataclass(frozen=True)
-class StageOutcome:
-    """How a stage ended, and its best iterate with its picture; `vector` is the start where nothing was better."""
-
-    status: Status
-    vector: Vector
-    image: Pixels | None = field(repr=False)
-    loss_start: float
-    loss_best: float
-    iterations: int
-
-
-@dataclass(frozen=True)
 class StagesOutcome:
     """Start and best of every stage in order, under the fit's own seed, and how the last stage that ran ended."""
 
@@ -103,7 +91,7 @@ def run_stages(
         if not settings.keep_optimizer_state:
             adam = _new_adam(renderer, settings)
         log = StageLog(renderer, loss.name, index, len(losses), listener, began, best)
-        outcome = run_stage(
+        status, found = run_stage(
             renderer,
             loss.value_and_gradient,
             candidates[-1].vector,
@@ -115,12 +103,8 @@ def run_stages(
             on_step=log,
             should_stop=should_stop,
         )
-        status = outcome.status
-        found = candidates[-1] if outcome.image is None else Candidate(outcome.vector, outcome.image)
-        candidates.append(found)
-        reports.append(
-            log.report(status, found.vector, outcome.loss_start, outcome.loss_best, iterations=outcome.iterations)
-        )
+        candidates.append(found or candidates[-1])
+        reports.append(log.report(status, candidates[-1].vector))
         if status in (Status.CANCELLED, Status.FAILED):
             break
     return StagesOutcome(status, tuple(candidates), tuple(reports))
@@ -143,16 +127,16 @@ def run_stage(
     spp: int,
     on_step: Callable[[Step], None],
     should_stop: Callable[[], bool],
-) -> StageOutcome:
-    """One stage: x <- Adam(x, dL/dx), dL/dx = (dI/dx)^T dL/dI, until a stopping rule fires.
+) -> tuple[Status, Candidate | None]:
+    """One stage: x <- Adam(x, dL/dx), dL/dx = (dI/dx)^T dL/dI, until a stopping rule fires; how it ended, and its best.
 
     The rate of `adam` is that of the schedule's first level. A step that leads to a loss or gradient that is not finite
-    is taken back half way to the best iterate; three in a row end the stage.
+    is taken back half way to the best iterate; three in a row end the stage. None is best where no loss was finite.
     """
     stopping = Stopping(rules)
     first_rate, level, strikes = adam.rate, 0, 0
-    x, best = start, start
-    best_loss, best_image, loss_start = math.inf, None, math.nan
+    x, best_loss = start, math.inf
+    best: Candidate | None = None
     status = None
     while status is None:
         if should_stop():
@@ -164,11 +148,9 @@ def run_stage(
             status = Status.CANCELLED
             break
         loss, pixel_gradient = value_and_gradient(image)
-        if stopping.iterations == 0:
-            loss_start = loss
         improved = loss < best_loss
         if improved:
-            best, best_loss, best_image = x, loss, image
+            best, best_loss = Candidate(x, image), loss
         status = stopping.observe(loss)
         more = _expected_iterations(stopping, schedule.levels - 1 - level)
         more = more if status is None else 0.0
@@ -180,7 +162,7 @@ def run_stage(
             adam.rate = schedule.rate(first_rate, level)
             adam.reset()
             stopping.resume()
-            x, status = best, None
+            x, status = start if best is None else best.vector, None
             continue
         if status is not None:
             break
@@ -195,10 +177,11 @@ def run_stage(
             continue
         strikes += 1
         adam.reset()
-        x = 0.5 * (x + best)
-        if strikes >= _STRIKES or best_image is None:
+        if strikes >= _STRIKES or best is None:
             status = Status.FAILED
-    return StageOutcome(status, best, best_image, loss_start, best_loss, stopping.iterations)
+        else:
+            x = 0.5 * (x + best.vector)
+    return status, best
 
 
 def _expected_iterations(stopping: Stopping, levels_left: int) -> float:

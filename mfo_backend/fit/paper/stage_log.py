@@ -84,10 +84,10 @@ class StageLog:
             self._listener(Preview(self._unseen))
             self._unseen = None
 
-    def report(
-        self, status: Status, vector: NDArray[np.float64], loss_start: float, loss_best: float, *, iterations: int
-    ) -> StageReport:
+    def report(self, status: Status, vector: NDArray[np.float64]) -> StageReport:
         """Tell the stage's end; `vector` holds its best values."""
+        iterations = len(self._curve)
+        loss_start, loss_best = (self._curve[0].loss, self._curve[-1].best) if self._curve else (np.nan, np.inf)
         self._best.tell(time.monotonic(), at_once=True)
         self._listener(StageEnd(self._name, status.value, status.sentence, iterations, loss_start, loss_best))
         return StageReport(
