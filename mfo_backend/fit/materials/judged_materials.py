@@ -75,9 +75,7 @@ def fit_together(
     tasks = [check_task(m.renderer, reference, m.settings, display, listener, should_stop) for m in members]
     tasks = [replace(task, noted=noted) for task in tasks]
     begin()
-    turns = take_turns(
-        members, reference, tasks[0].light, recorded, display=display, listener=listener, should_stop=should_stop
-    )  # fmt: skip
+    turns = take_turns(members, tasks, recorded)
     starts = [member.renderer.start for member in members]
     # it only says from where the errors came
     start = np.mean(_halves(members, starts, LOOK_SAMPLES), axis=0, dtype=np.float32)

@@ -5,23 +5,22 @@ from __future__ import annotations
 
 import sys
 import traceback
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ...metrics.display.tone_mapping import View
 from ...render.paths.recorded_scene import DIRECT, RecordedScene
 from ...render.pictures.mitsuba_renderer import MitsubaRenderer
 from ...render.pictures.renderer import Interrupted
 from ...render.sheet.recorded_sheet import RecordedSheet
 from ...render.sheet.sheet_renderer import SheetRenderer
 from ...types.errors import BadInputError, MfoError, UnrecordableError
-from ...types.event import Listener
 from ...types.image import Image, Pixels
 from ...types.status import Status
 from ..judge.checked_reference import check_reference
+from ..judge.fit_task import FitTask
 from ..plans import RecordedPlan
 from ..random_streams import Stream
 from ..recorded.fit import recorded_scene
@@ -105,23 +104,14 @@ def check_members(members: Sequence[Member], reference: Image) -> list[Recorded]
     return recorded
 
 
-def take_turns(
-    members: Sequence[Member],
-    reference: Image,
-    light: Pixels,
-    recorded: Sequence[Recorded],
-    *,
-    display: View | None,
-    listener: Listener,
-    should_stop: Callable[[], bool],
-) -> Turns:
+def take_turns(members: Sequence[Member], tasks: Sequence[FitTask], recorded: Sequence[Recorded]) -> Turns:
     """Fit each material in the light that the others give with their newest values, until that holds still.
 
     The first round searches from nothing, quickly. The second has the preset's plan and searches again what sees other
     light than at its own first fit: in wrong light a coat or a sheen is easily missed, and no solution nearby has it.
     Those after it fit again what sees other light than at its own last fit, from its values there. A queue ends with
-    the first. `light` is the reference as scene-linear radiance, `recorded` what `check_members` says. A material whose
-    fit fails without a reason that a user can do something about stays as it is from then on, and a note says so.
+    the first. `recorded` is what `check_members` says. A material whose fit fails without a reason that a user can do
+    something about stays as it is from then on, and a note says so.
 
     Raises
     ------
@@ -130,11 +120,10 @@ def take_turns(
     Interrupted
         If it was asked to stop before one of them had been fitted.
     """
-    seed = members[0].settings.seed
-    masks = [check_reference(reference, member.renderer.target_mask()) for member in members]
-    present = evened_light([member.renderer for member in members], masks, light, Stream.TOGETHER.seed(seed))
-    queue = members[0].settings.queue
-    course = WholeCourse([member.name for member in members], listener, SHARES[:1] if queue else SHARES)
+    whole, masks = tasks[0], [task.mask for task in tasks]
+    seed, queue, should_stop = whole.settings.seed, whole.settings.queue, whole.should_stop
+    present = evened_light([member.renderer for member in members], masks, whole.light, Stream.TOGETHER.seed(seed))
+    course = WholeCourse([member.name for member in members], whole.listener, SHARES[:1] if queue else SHARES)
     outcomes: list[FitOutcome | None] = [None for _ in members]
     failed: dict[int, Exception] = {}
     now: Pixels | None = None  # all materials as they are now, and as each was left by its own last fit
@@ -162,9 +151,9 @@ def take_turns(
                 plan = RecordedPlan.of(quick.preset).of_a_small_target()
             try:
                 outcome = recover_material(
-                    member.renderer, reference, quick if number == 1 else member.settings, display=display,
-                    listener=course.of(k, number), should_stop=should_stop, hand_over=False, plan=plan,
-                    recorded=recorded[k],
+                    member.renderer, whole.reference, quick if number == 1 else member.settings,
+                    display=whole.display, listener=course.of(k, number), should_stop=should_stop, hand_over=False,
+                    plan=plan, recorded=recorded[k],
                     begin=None if number < 3 and moved else present[k], judged=False,
                 )  # fmt: skip
             except UnrecordableError as error:

@@ -9,6 +9,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
+from mfo_backend.fit.judge.fit_task import check_task
 from mfo_backend.fit.materials import rounds
 from mfo_backend.fit.materials.evened_light import evened_light
 from mfo_backend.fit.materials.rounds import (
@@ -187,10 +188,9 @@ def turns(
 ) -> rounds.Turns:
     monkeypatch.setattr(rounds, "recover_material", fits)
     monkeypatch.setattr(rounds, "evened_light", lambda renderers, *_: [r.start.copy() for r in renderers])
-    return take_turns(
-        members(3, queue=queue), SHOWN, SHOWN.pixels, recorded,
-        display=None, listener=lambda event: None, should_stop=fits.stopped,
-    )  # fmt: skip
+    three = members(3, queue=queue)
+    tasks = [check_task(m.renderer, SHOWN, m.settings, None, lambda event: None, fits.stopped) for m in three]
+    return take_turns(three, tasks, recorded)
 
 
 def test_turns_end_when_the_light_holds_still(monkeypatch: pytest.MonkeyPatch) -> None:
