@@ -4,7 +4,6 @@
 from __future__ import annotations
 
 from itertools import product
-from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -50,8 +49,8 @@ def likely_cause(
     noted
         Whether the export named something that it has left out.
     """
-    shift = _best_shift(reference, result, mask)
-    if shift.explained > EXPLAINED:
+    explained, is_away = _best_shift(reference, result, mask)
+    if explained > EXPLAINED:
         return Cause.CAMERA_OR_SHAPE
     if around is not None and not _has_outline(reference, result, mask):
         return Cause.PICTURE
@@ -59,7 +58,7 @@ def likely_cause(
     if around is not None and (_differing(*around) > MOSTLY or on_target > ON_TARGET):
         return Cause.LIGHT
     # what stands before the object or throws a shadow on it is at its silhouette, too, and moves nothing
-    if _is_at_rim(reference, result, mask) and (around is None or shift.is_away):
+    if _is_at_rim(reference, result, mask) and (around is None or is_away):
         return Cause.CAMERA_OR_SHAPE
     if around is not None:
         return Cause.SURROUNDINGS
@@ -89,15 +88,11 @@ def _has_outline(reference: Shown, result: Shown, mask: Mask) -> bool:
     return bool(max(correlation, slope) >= NO_OUTLINE)
 
 
-class _Shift(NamedTuple):
-    """How the result is best moved over the reference: what part of the squared difference goes, and whether at all."""
+def _best_shift(reference: Shown, result: Shown, mask: Mask) -> tuple[float, bool]:
+    """What part of the squared difference goes where the result is best moved over the reference, and whether it is.
 
-    explained: float
-    is_away: bool
-
-
-def _best_shift(reference: Shown, result: Shown, mask: Mask) -> _Shift:
-    """That of some pixels at the target and beside it."""
+    At the target and beside it, by some pixels.
+    """
     first, second = _calm(reference), _calm(result)
     near = widened(mask, SHIFTED_WITHIN)
     edge = MOST_SHIFT  # what is moved in from outside of the picture is not known
@@ -105,14 +100,14 @@ def _best_shift(reference: Shown, result: Shown, mask: Mask) -> _Shift:
     inside = (slice(edge, height - edge), slice(edge, width - edge))
     chosen = near[inside]
     if not chosen.any():
-        return _Shift(0.0, is_away=False)
+        return 0.0, False
 
     def apart(down: int, right: int) -> float:
         moved = second[edge + down : height - edge + down, edge + right : width - edge + right]
         return float(np.square(first[inside] - moved)[chosen].mean())
 
     best = min(product(range(-MOST_SHIFT, MOST_SHIFT + 1), repeat=2), key=lambda shift: apart(*shift))
-    return _Shift(1.0 - apart(*best) / max(apart(0, 0), 1e-30), is_away=best != (0, 0))
+    return 1.0 - apart(*best) / max(apart(0, 0), 1e-30), best != (0, 0)
 
 
 def _calm(picture: Shown) -> NDArray[np.float64]:
