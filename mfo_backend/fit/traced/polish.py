@@ -123,17 +123,9 @@ def _counted(setting: Setting, stage: Stage, raced: Sequence[Vector]) -> tuple[S
         if counts is None or abs(counts.count - count) <= STILL * count or setting.course.should_stop():
             break
         count = counts.count
+        held, stream = setting.extras, Stream.POLISH_COUNTED
         ends = [
-            _pool(
-                setting,
-                stage,
-                start,
-                setting.extras,
-                Stream.POLISH_COUNTED,
-                10 * turn,
-                steps=COUNTED_STEPS,
-                paths=few,
-            ).x
+            _pool(setting, stage, start, held, stream, 10 * turn, steps=COUNTED_STEPS, paths=few).x
             for start in ([x] if turn else raced)
         ]
         x = ends[choose_end(pictures, ends, setting.plan, setting.seed, Stream.CHOOSE_COUNTED, GUARD_PARTS * turn)]
