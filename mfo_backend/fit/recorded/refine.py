@@ -89,9 +89,8 @@ def refine_sampled(setting: Setting, basins: Sequence[Vector]) -> OnRecording:
         stage.vector = x
         # the first weights came from a model that was still off
         found = _problems(recording, x, solve_all=True)
-        alike = setting.plan.alike
-        others = [*others, *(taken_for(x, setting.table) if alike else ())]
-        rival = better_basin(setting, found.refined.few, x, others, significant=alike)
+        others = [*others, *(taken_for(x, setting.table) if setting.plan.alike else ())]
+        rival = better_basin(setting, found.refined.few, x, others)
         if rival is not None:
             known, number = found.refined.few.equations(x).cost, recording.number
             del found, recording

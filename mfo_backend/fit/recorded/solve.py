@@ -55,12 +55,11 @@ def solve_within(setting: Setting, problem: Problem, start: Vector, box: Box, *,
     return solve(setting, problem, start, FEW_EVALUATIONS, box=box, wanted=wanted).x
 
 
-def better_basin(
-    setting: Setting, problem: Problem, found: Vector, others: Sequence[Vector], *, significant: bool = False
-) -> Vector | None:
+def better_basin(setting: Setting, problem: Problem, found: Vector, others: Sequence[Vector]) -> Vector | None:
     """The best of the other basins on the same problem, if it is clearly better than `found`.
 
-    Of few residuals a small part is chance: one that is `significant` has a chi squared that noise does not explain.
+    Of few residuals a small part is chance: among materials that are `alike` one has to have a chi squared that noise
+    does not explain.
     """
     if not others or setting.course.should_stop():
         return None
@@ -69,7 +68,7 @@ def better_basin(
     known = solve(setting, problem, found, evaluations).equations.cost
     rivals = (solve(setting, problem, x, evaluations, known=known) for x in others)
     best = min(rivals, key=lambda rival: rival.equations.cost)
-    lower = min(CLEARLY_LOWER, 1.0 - SIGNIFICANT / problem.independent) if significant else CLEARLY_LOWER
+    lower = min(CLEARLY_LOWER, 1.0 - SIGNIFICANT / problem.independent) if setting.plan.alike else CLEARLY_LOWER
     return best.x if best.equations.cost < lower * known else None
 
 

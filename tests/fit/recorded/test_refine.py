@@ -148,7 +148,7 @@ def test_a_rival_has_to_be_better_on_a_recording_of_its_own(monkeypatch, cost_th
     )
     monkeypatch.setattr(refine_module, "_recorded_near", recorded_near)
     monkeypatch.setattr(refine_module, "_problems", problems)
-    monkeypatch.setattr(refine_module, "better_basin", lambda setting, problem, x, others, significant: rival)
+    monkeypatch.setattr(refine_module, "better_basin", lambda setting, problem, x, others: rival)
     monkeypatch.setattr(refine_module, "_last_steps", lambda setting, stage, refined: refined)
     end = refine_module.refine_sampled(setting, [found, rival])
     assert end.refined.x is (rival if kept == "rival" else found)

@@ -52,12 +52,12 @@ def test_of_few_residuals_a_lower_cost_may_be_chance(independent, significant, f
         return NormalEquations(0.0199 - 0.01 * (x[0] > 0.0), 0.0 * here.gradient, here.hessian)
 
     setting = SimpleNamespace(
-        plan=RecordedPlan(),
+        plan=RecordedPlan(alike=significant),
         table=SimpleNamespace(lower=np.array([-3.0]), upper=np.array([3.0])),
         course=SimpleNamespace(should_stop=lambda: False),
         sampled=True,
     )
     problem = SimpleNamespace(equations=equations, independent=independent, near=None)
     left, right = np.array([-0.995]), np.array([0.4])
-    rival = better_basin(setting, problem, left, [right], significant=significant)
+    rival = better_basin(setting, problem, left, [right])
     assert (rival is not None) is found
