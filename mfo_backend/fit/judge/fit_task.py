@@ -20,6 +20,7 @@ from ...types.image import Encoding, Image, Pixels
 from ..candidates import Candidates
 from ..settings import FitSettings
 from .checked_reference import check_reference, counted_pixels
+from .picture_judge import PictureJudge
 from .region import fill_outside
 
 
@@ -79,8 +80,15 @@ class FitTask:
 
     @property
     def measure(self) -> str:
-        """The loss by which a result is chosen where the settings name none: FLIP in the reference's range."""
+        """The loss by which a result is chosen: the last that the settings name, else FLIP in the reference's range."""
+        if self.settings.losses is not None:
+            return self.settings.stage_names(self.reference.encoding)[-1]
         return "flip-hdr" if self.linear and self.settings.range != "ldr" else "flip-ldr"
+
+    def judge(self, background: Pixels, *, blurred: bool) -> PictureJudge:
+        """The `measure` of pictures, with `background` where they do not count; see `PictureJudge`."""
+        reference, mask, settings, view = self.reference, self.mask, self.settings, self.view
+        return PictureJudge(self.measure, reference, background, mask, settings, view, blurred=blurred)
 
     def only_counted(self, result: Pixels) -> FitTask:
         """The task with a reference that shows the `result` itself where it does not count.

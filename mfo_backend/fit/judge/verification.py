@@ -13,7 +13,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...metrics.display.baked_view import HALF_LEVEL
-from ...metrics.display.tone_mapping import View
 from ...metrics.flip.block_means import block_side, full_blocks, means_beside
 from ...metrics.flip.flip_error import shown
 from ...render.camera.widened_mask import widened
@@ -24,6 +23,7 @@ from ...types.event import PREVIEW_SIDE
 from ...types.image import Encoding, Image, Pixels
 from ..random_streams import Stream
 from ..result.outcome import Candidate
+from .fit_task import FitTask
 from .region import blocks_around
 
 FIRST_SAMPLES = 16  # of a pixel of a comparison: a quarter of the noise (squares) of a reference of 4 samples
@@ -110,37 +110,22 @@ class Verifier(Protocol):
 class Verification:
     """Renders the ends of one fit; all of them see the same random numbers.
 
-    A picture goes on where it is looked at: where `mask` is True, and next to that. Where many pixels are, they are
-    compared at a fraction of the size (`metrics.block_means`), and a pixel needs fewer samples.
+    A picture goes on where it is looked at: in the pixels that count, and next to them. Where these are many, they are
+    compared at a fraction of the size (`metrics.block_means`), and a pixel needs fewer samples. Differences and noise
+    are compared in the values of the task's view, as every measure of a fit sees them compressed.
 
-    Parameters
-    ----------
-    first, most
-        Samples of an end's picture, at least for a pixel of a comparison and at most for one of the picture. The first
-        often say enough: under a noisy reference a picture without noise looks no nearer.
-    view
-        What a display shows: differences and noise are compared in its values, as every measure of a fit sees them
-        compressed.
+    An end's picture has `first` samples at least for a pixel of a comparison, and at most the settings' `verify_spp`
+    for one of the picture. The first often say enough: under a noisy reference a picture without noise looks no nearer.
     """
 
-    def __init__(
-        self,
-        renderer: MitsubaRenderer | SheetRenderer,
-        reference: Image,
-        mask: NDArray[np.bool_],
-        view: View,
-        *,
-        seed: int,
-        most: int,
-        first: int = FIRST_SAMPLES,
-        should_stop: Callable[[], bool] = lambda: False,
-    ) -> None:
-        self._renderer, self._mask, self._view, self._should_stop = renderer, mask, view, should_stop
-        self._side, self._encoding = block_side(mask), reference.encoding
+    def __init__(self, renderer: MitsubaRenderer | SheetRenderer, task: FitTask, first: int = FIRST_SAMPLES) -> None:
+        mask, most = task.counted, task.settings.verify_spp
+        self._renderer, self._mask, self._view, self._should_stop = renderer, mask, task.view, task.should_stop
+        self._side, self._encoding = block_side(mask), task.reference.encoding
         self._near = blocks_around(mask, self._side)
         self._compared = full_blocks(mask[self._near], self._side)
-        self._reference = self._displayed(reference)
-        self._seed = Stream.VERIFY.seed(seed)
+        self._reference = self._displayed(task.reference)
+        self._seed = Stream.VERIFY.seed(task.settings.seed)
         close = widened(mask, BLURRED)
         self._looked_at, self._around = np.flatnonzero(close), np.flatnonzero(~close)
         # of one half, as all counts of samples from here on

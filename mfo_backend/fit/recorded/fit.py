@@ -24,7 +24,6 @@ from ..alike.unneeded_lobes import box_holding
 from ..certainty.covariance import certainties_away
 from ..certainty.weak_combinations import weak_combinations
 from ..judge.fit_task import FitTask
-from ..judge.picture_judge import PictureJudge
 from ..judge.verification import FIRST_SAMPLES, FIRST_SAMPLES_EXACT, Verification
 from ..pictures.contradiction import contradiction
 from ..pictures.next_picture import Doubt, Evidence, Known, next_picture, open_values
@@ -94,8 +93,6 @@ class RecordedRoute:
         settings = task.settings
         self._task, self._renderer = task, renderer
         self._plan = plan or RecordedPlan.of(settings.preset)
-        named = None if settings.losses is None else settings.stage_names(task.reference.encoding)
-        self._measure = named[-1] if named else task.measure
         self._finishing = finishing_residuals(settings, task.reference.encoding, task.light, task.mask, task.view)
         self._scene = scene or recorded_scene(renderer, task.mask, task.reference.counts)
         # where every light is exact the search is quick, and its recording serves for the refinement
@@ -106,16 +103,8 @@ class RecordedRoute:
             *self._finishing,
             *(["flip"] if settings.preset == "best" else []),
         )
-        self.verification = Verification(
-            renderer,
-            task.reference,
-            task.counted,
-            task.view,
-            seed=settings.seed,
-            first=FIRST_SAMPLES_EXACT if self._scene.lights_exact else FIRST_SAMPLES,
-            most=settings.verify_spp,
-            should_stop=task.should_stop,
-        )
+        first = FIRST_SAMPLES_EXACT if self._scene.lights_exact else FIRST_SAMPLES
+        self.verification = Verification(renderer, task, first)
 
     def fit(self) -> RouteEnds:
         """Run the stages.
@@ -135,13 +124,13 @@ class RecordedRoute:
         started = start_from_nothing(setting) if self._begin is None else Started(None, (self._begin,), None)
         first, *others = started.basins
         if task.should_stop():
-            choose = self._choose_by(self._judge(blurred=False).value)
+            choose = self._choose_by(task.judge(task.light, blurred=False).value)
             return RouteEnds((End("start", first),), 1, choose, tuple(course.reports), tuple(scene.needs.notes))
 
         end = refine_sampled(setting, started.basins) if setting.sampled else refine_exact(setting, started)
         end = replace(end, refined=end.refined.near(setting.table, setting.user))
         del started  # and with it the first recording
-        kept = keep_values(end, None if setting.sampled else self._judge(blurred=False).value)
+        kept = keep_values(end, None if setting.sampled else task.judge(task.light, blurred=False).value)
         disagree = self._contradiction(end, kept)
         later, notes, counts = self._perceptual(end, kept, others)
         notes = [*scene.needs.notes, *notes]
@@ -232,18 +221,14 @@ class RecordedRoute:
             if deviations < AT_NOISE:
                 return [], [NOTHING_BUT_NOISE.format(100 * noise.level)], _misfit(end)
         may_blur = task.linear and settings.losses is None
-        judge = self._judge(blurred=may_blur and (setting.sampled or (noise is not None and noise.level > NOISY)))
+        blurred = may_blur and (setting.sampled or (noise is not None and noise.level > NOISY))
+        judge = task.judge(task.light, blurred=blurred)
         box = box_holding(setting.table, setting.user, kept.held)
         basins = others if settings.preset == "best" else []
         later, notes = perceptual_ends(
             end.recording.whole, problem, kept.x, basins, box, self._finishing, judge, settings
         )
         return later, notes, judge.value
-
-    def _judge(self, *, blurred: bool) -> PictureJudge:
-        task = self._task
-        light, mask = task.light, task.mask
-        return PictureJudge(self._measure, task.reference, light, mask, task.settings, task.view, blurred=blurred)
 
     def _unless_seen(self, asked: int, choose: Callable[..., Choice]) -> Callable[..., Choice]:
         """A choice among start and ends, but for the `asked` ends after the first.
@@ -252,7 +237,7 @@ class RecordedRoute:
         """
         if not asked:
             return choose
-        seen = self._judge(blurred=self._task.linear).value
+        seen = self._task.judge(self._task.light, blurred=self._task.linear).value
 
         def choice(images: Sequence[Pixels]) -> Choice:
             chosen = choose([*images[:2], *images[2 + asked :]])

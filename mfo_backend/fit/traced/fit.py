@@ -68,15 +68,7 @@ class TracedRoute:
         self._seen_residuals = finishing_residuals(settings, encoding, task.light, task.mask, task.view)
         own = STAGES if begin is None else STAGES[2:]
         self.stages = (*own, *self._seen_residuals, *([FLIP] if settings.preset == "best" else []))
-        self.verification = Verification(
-            renderer,
-            task.reference,
-            task.counted,
-            task.view,
-            seed=settings.seed,
-            most=settings.verify_spp,
-            should_stop=task.should_stop,
-        )
+        self.verification = Verification(renderer, task)
 
     def fit(self) -> RouteEnds:
         """Run the stages."""
@@ -122,7 +114,7 @@ class TracedRoute:
         if self._seen_residuals and ends and not should_stop():
             linear = LinearPictures(pictures, seed)
             if linear.are_worth_it(found[0], task.reference, task.view):
-                judge = self._judge(task.light, blurred=task.linear)
+                judge = task.judge(task.light, blurred=task.linear)
                 end = lower_seen_error(
                     linear, judge, self._seen_residuals, found[0], ends[-1].kept, course, flip=FLIP in self.stages
                 )
@@ -166,7 +158,7 @@ class TracedRoute:
         """The first end unless the eye sees that another is better; a perceptual one is judged below the noise."""
 
         def choose(images: Sequence[Pixels]) -> Choice:
-            plain = self._judge(images[0], blurred=False)
+            plain = self._task.judge(images[0], blurred=False)
             start, *seen = (plain.value(image) for image in images)
             best = 0 if squares == 1 or seen[0] <= seen[1] + VISIBLE else 1
             if judge is not None and best == 0 and judge.value(images[-1]) < judge.value(images[1]):
@@ -174,11 +166,6 @@ class TracedRoute:
             return Choice(best, seen[best] < start)
 
         return choose
-
-    def _judge(self, background: Pixels, *, blurred: bool) -> PictureJudge:
-        task = self._task
-        settings, view = task.settings, task.view
-        return PictureJudge(task.measure, task.reference, background, task.mask, settings, view, blurred=blurred)
 
     def _known(self, ends: Sequence[Polished]) -> tuple[dict[str, Certainty], tuple[str, ...]]:
         """How sure the last end's values are, and a sentence on those that went back to the user's unseen."""

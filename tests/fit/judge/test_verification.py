@@ -3,6 +3,8 @@
 
 from __future__ import annotations
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 
@@ -17,6 +19,7 @@ from mfo_backend.fit.judge.verification import (
     SHOWN_SAMPLES,
     Verification,
 )
+from mfo_backend.fit.settings import FitSettings
 from mfo_backend.metrics.display.colour import srgb_from_linear
 from mfo_backend.metrics.display.tone_mapping import DisplayView
 from mfo_backend.render.camera.widened_mask import widened
@@ -47,10 +50,14 @@ class Renderer:
         return lambda: (vector[0] + noise).astype(np.float32)
 
 
-def verification(renderer, reference, most=MOST, shape=SHAPE, mask=None, **more):
+def verification(renderer, reference, most=MOST, shape=SHAPE, mask=None, should_stop=lambda: False, **more):
     image = Image(np.broadcast_to(np.float32(reference), shape).astype(np.float32), Encoding.LINEAR)
     mask = np.ones(shape[:2], bool) if mask is None else mask
-    return Verification(renderer, image, mask, DisplayView(), seed=7, most=most, **more)
+    task = SimpleNamespace(
+        reference=image, counted=mask, view=DisplayView(), settings=FitSettings(seed=7, verify_spp=most),
+        should_stop=should_stop,
+    )  # fmt: skip
+    return Verification(renderer, task, **more)
 
 
 def samples_of(renderer, value):

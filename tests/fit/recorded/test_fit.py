@@ -266,10 +266,9 @@ def test_a_richer_material_is_taken_where_an_eye_sees_that_it_is_better(richer_e
     from mfo_backend.fit.recorded.fit import RecordedRoute
     from mfo_backend.fit.result.outcome import Choice
 
-    route = SimpleNamespace(
-        _task=SimpleNamespace(linear=True), _judge=lambda *, blurred: SimpleNamespace(value=lambda image: image)
-    )
-    choose = RecordedRoute._unless_seen(route, 1, lambda images: Choice.of(images))
+    judge = SimpleNamespace(value=lambda image: image)
+    task = SimpleNamespace(linear=True, light=None, judge=lambda background, *, blurred: judge)
+    choose = RecordedRoute._unless_seen(SimpleNamespace(_task=task), 1, lambda images: Choice.of(images))
     assert choose([0.3, 0.1, richer_error]) == Choice(chosen, True)
     # the end of a later stage is better still
     assert choose([0.3, 0.1, richer_error, 0.05]) == Choice(2, True)
