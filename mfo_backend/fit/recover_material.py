@@ -248,6 +248,6 @@ def _judged(task: FitTask, result: FitResult, first: Candidate, end: Candidate, 
         end = first if shown is first.image else end  # the gap below is that of what is shown
     halves = _halves(task, end)
     if halves is not None and not stopped:
-        result = with_gap(result, task.reference, halves, task.mask, task.view)
+        result = with_gap(result, task, halves)
     result = replace(result, seconds=time.monotonic() - task.began)  # a verdict takes time as well
     return FitOutcome(result, first.image, end.image, task.counted, halves)

@@ -16,6 +16,7 @@ from ...types.image import Encoding, Image, Pixels
 from ...types.model_gap import ModelGap
 from ...types.result import FitResult
 from ..tolerances import CHANCE, DIM_FLOOR
+from .fit_task import FitTask
 from .region import blocks_around
 
 GAP_BLOCK = 4  # pixels along each side of what is compared
@@ -57,11 +58,9 @@ def model_gap(reference: Image, renders: tuple[Pixels, Pixels], mask: NDArray[np
     return ModelGap(found, max(square + CONFIDENCE * sd, 0.0) ** 0.5)
 
 
-def with_gap(
-    result: FitResult, reference: Image, renders: tuple[Pixels, Pixels], mask: NDArray[np.bool_], view: View
-) -> FitResult:
+def with_gap(result: FitResult, task: FitTask, renders: tuple[Pixels, Pixels]) -> FitResult:
     """The result with its `model_gap`, and the sentence on it among its notes."""
-    gap = model_gap(reference, renders, mask, view)
+    gap = model_gap(task.reference, renders, task.mask, task.view)
     said = (gap.sentence,) if gap is not None and gap.sentence else ()
     return replace(result, model_gap=gap, notes=(*result.notes, *said))
 

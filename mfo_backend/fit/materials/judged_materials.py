@@ -96,7 +96,7 @@ def fit_together(
         if stopped:
             result = replace(result, status=Status.CANCELLED, message=Status.CANCELLED.sentence)
         else:
-            result = with_gap(result, task.only_counted(end).reference, halves, task.mask, task.view)
+            result = with_gap(result, task.only_counted(end), halves)
         outcomes.append(FitOutcome(result, start, end, task.counted, halves))
     return Together(tuple(outcomes), turns.rounds)
 
