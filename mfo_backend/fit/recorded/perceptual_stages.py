@@ -5,6 +5,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 
@@ -93,7 +94,7 @@ def _lower_flip(recording: Recording, judge: PictureJudge, starts: list[Vector],
 
     with course.stage("flip") as stage:
         stage.picture = recording.preview
-        told, stop = course.values(stage), course.should_stop
+        told, stop = partial(course.note, stage), course.should_stop
         ends = [minimise_flip(judge, picture, x, *box, on_value=told, should_stop=stop) for x in starts]
         stage.vector = min(ends, key=lambda end: end[1])[0]
     return [x for x, _ in ends]

@@ -106,31 +106,12 @@ class Course:
     ) -> Callable[[Vector], NormalEquations]:
         """`residuals`, with every evaluation noted in `stage`."""
 
-        noted = self.values(stage)
-
         def watched(x: Vector) -> NormalEquations:
             equations = residuals(x)
-            noted(x, float(np.sqrt(2.0 * equations.cost)) if equations.finite else np.inf)
+            self.note(stage, x, float(np.sqrt(2.0 * equations.cost)) if equations.finite else np.inf)
             return equations
 
         return watched
-
-    def values(self, stage: Stage) -> Callable[[Vector, float], None]:
-        """A function that notes the loss of every vector it is told in `stage`."""
-
-        def noted(x: Vector, loss: float) -> None:
-            if loss < stage.loss_best:
-                stage.best = x.copy()
-                self._best.found(stage.name, x)
-            self.note(stage, loss)
-            self._show(stage, time.monotonic())
-
-        return noted
-
-    def _show(self, stage: Stage, now: float) -> None:
-        """Tell a preview of the stage's best, where that is new."""
-        if stage.best is not None and now - self._shown >= ONCE_SECONDS:
-            self.show(stage, stage.best)
 
     def show(self, stage: Stage, x: Vector) -> None:
         """Tell a preview of `x`, the best so far, however long ago the last one was."""
@@ -140,15 +121,14 @@ class Course:
             self._listener(Preview(stage.picture(x)))
         stage.best, self._shown = None, time.monotonic()
 
-    def reached(self, stage: Stage, x: Vector, loss: float) -> None:
-        """Note an evaluation whose vector is the best so far whatever its loss, which noise has a part in."""
-        stage.best = x.copy()
-        self._best.found(stage.name, x)
-        self.note(stage, loss)
-        self._show(stage, time.monotonic())
+    def note(self, stage: Stage, x: Vector, loss: float, *, best: bool = False) -> None:
+        """Add an evaluation with this root mean square to `stage` and tell the listener, if it has not just heard.
 
-    def note(self, stage: Stage, loss: float) -> None:
-        """Add an evaluation with this root mean square to `stage` and tell the listener, if it has not just heard."""
+        `best` is the best so far whatever its loss, which noise may have a part in.
+        """
+        if best or loss < stage.loss_best:
+            stage.best = x.copy()
+            self._best.found(stage.name, x)
         if not stage.curve:
             stage.loss_start = loss
         stage.loss_best = min(stage.loss_best, loss)
@@ -159,6 +139,8 @@ class Course:
         if now - self._told > _QUIET_SECONDS:
             self._told = now
             self._tell(stage, loss, seconds)
+        if stage.best is not None and time.monotonic() - self._shown >= ONCE_SECONDS:
+            self.show(stage, stage.best)
 
     def _tell(self, stage: Stage, loss: float, seconds: float) -> None:
         index = self.names.index(stage.name)

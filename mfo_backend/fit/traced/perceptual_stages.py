@@ -5,6 +5,7 @@ of what an eye sees, then FLIP."""
 from __future__ import annotations
 
 from collections.abc import Mapping
+from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
@@ -83,14 +84,8 @@ def _lower_flip(
     x, width = start, pictures.width
     with course.stage(FLIP) as stage:
         for turn in range(1, 1 + ROUNDS):
-            new, _ = minimise_flip(
-                judge,
-                picture,
-                x,
-                *pictures.box(x, kept),
-                on_value=course.values(stage),
-                should_stop=course.should_stop,
-            )
+            told, stop, box = partial(course.note, stage), course.should_stop, pictures.box(x, kept)
+            new, _ = minimise_flip(judge, picture, x, *box, on_value=told, should_stop=stop)
             moved = float(np.max(np.abs(new - x) / width))
             x = stage.vector = new
             following = pictures.around(x, turn + 1) if turn < ROUNDS and moved >= SHORT_WAY else None

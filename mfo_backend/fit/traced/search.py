@@ -66,7 +66,7 @@ class Setting:
 
     def note(self, stage: Stage, x: Vector, cost: float) -> None:
         """Report a point with the root mean square of its residual."""
-        self.course.reached(stage, x, float(np.sqrt(max(2.0 * cost, 0.0))))
+        self.course.note(stage, x, float(np.sqrt(max(2.0 * cost, 0.0))), best=True)
 
 
 def scan(setting: Setting) -> list[Vector]:

@@ -167,9 +167,8 @@ def test_previews_come_at_most_once_a_second_and_show_the_fit(tmp_path):
     course = Course(renderer, ("scan", "start", "refine"), events.append, lambda: False, -1e9)
     with course.stage("start") as stage:
         stage.picture = lambda x: np.full((2, 2, 3), x[0], np.float32)
-        told = course.values(stage)
         for step in range(50):
-            told(np.array([float(step)]), 1.0 / (step + 1))
+            course.note(stage, np.array([float(step)]), 1.0 / (step + 1))
     previews = [e for e in events if isinstance(e, Preview)]
     assert len(previews) == 1  # all 50 within a second
     assert previews[0].image[0, 0, 0] == 0.0
