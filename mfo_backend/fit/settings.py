@@ -54,7 +54,7 @@ class FitSettings:
         Of each stage; `patience` is the ten of the paper's rules.
     learning_rate, schedule
         Adam's rate as a share of each parameter's range, and whether it stays (``"constant"``, the paper's rules to
-        the letter) or falls to a third at each stall (``"decay"``, see `fit.schedule`).
+        the letter) or falls to a third at each stall (``"decay"``, see `fit.paper.loop`).
         Ten random materials and starts (reduced set, point light, 64x64, HDR) ended above the noise floor by a mean
         FLIP over the object of 0.0005 with decay from 0.05, 0.0019 from 0.02, and 0.031 with a constant 0.05.
     keep_optimizer_state

@@ -9,7 +9,7 @@ Given are one reference R, and a renderer that makes a picture I(x) of the mater
 
 A stage stops when for ten iterations its loss does not change, when for ten iterations its best loss does not improve,
 or at the user's maximum of iterations (`solve.stopping`). The paper leaves the optimiser open; this one is Adam
-(`solve.adam`), and `Schedule` says what becomes of its rate. Any list of losses makes as many stages.
+(`solve.adam`), and `LEVELS` says what becomes of its rate. Any list of losses makes as many stages.
 
 With a fixed seed every I(x) of a fit sees the same random numbers, so the losses of two iterates differ by x alone.
 """
@@ -39,25 +39,12 @@ from .stage_log import StageLog, Step
 _STRIKES = 3  # steps in a row without a finite loss and gradient after which a stage gives up
 
 
-@dataclass(frozen=True)
-class Schedule:
-    """Rates a stage goes through: `levels` of them, each `factor` of the one before.
-
-    With a constant rate near a minimum Adam walks in steps of about that rate. The best loss stops improving, and the
-    rule of ten iterations ends the stage wherever it happens to be; under FLIP that is often at its very start. With
-    more levels each such stall is answered by going back to the best x with a third of the rate and new moments. The
-    stage ends by the same rule at the last level.
-    """
-
-    levels: int = 1
-    factor: float = 1.0 / 3.0
-
-    def rate(self, first: Vector, level: int) -> Vector:
-        """The rate at `level`, counted from 0."""
-        return first * self.factor**level
-
-
-SCHEDULES = {"constant": Schedule(levels=1), "decay": Schedule(levels=4)}
+# Rates that a stage goes through, each a third of the one before.
+# With a constant rate near a minimum Adam walks in steps of about that rate. The best loss stops improving, and the
+# rule of ten iterations ends the stage wherever it happens to be; under FLIP that is often at its very start. With
+# more rates each such stall is answered by going back to the best x with the next one and new moments. The stage ends
+# by the same rule at the last rate.
+LEVELS = {"constant": 1, "decay": 4}
 
 
 @dataclass(frozen=True)
@@ -97,7 +84,7 @@ def run_stages(
             candidates[-1].vector,
             adam,
             rules=settings.rules,
-            schedule=SCHEDULES[settings.schedule],
+            levels=LEVELS[settings.schedule],
             seed=settings.seed,
             spp=settings.spp,
             on_step=log,
@@ -122,7 +109,7 @@ def run_stage(
     adam: Adam,
     *,
     rules: StoppingRules,
-    schedule: Schedule,
+    levels: int,
     seed: int,
     spp: int,
     on_step: Callable[[Step], None],
@@ -130,7 +117,7 @@ def run_stage(
 ) -> tuple[Status, Candidate | None]:
     """One stage: x <- Adam(x, dL/dx), dL/dx = (dI/dx)^T dL/dI, until a stopping rule fires; how it ended, and its best.
 
-    The rate of `adam` is that of the schedule's first level. A step that leads to a loss or gradient that is not finite
+    The rate of `adam` is the first of `levels` rates. A step that leads to a loss or gradient that is not finite
     is taken back half way to the best iterate; three in a row end the stage. None is best where no loss was finite.
     """
     stopping = Stopping(rules)
@@ -152,14 +139,14 @@ def run_stage(
         if improved:
             best, best_loss = Candidate(x, image), loss
         status = stopping.observe(loss)
-        more = _expected_iterations(stopping, schedule.levels - 1 - level)
+        more = _expected_iterations(stopping, levels - 1 - level)
         more = more if status is None else 0.0
         on_step(Step(stopping.iterations, loss, best_loss, more, improved, x, image))
 
-        may_go_on = level + 1 < schedule.levels and stopping.iterations < rules.max_iterations
+        may_go_on = level + 1 < levels and stopping.iterations < rules.max_iterations
         if status is Status.STALE and may_go_on:
             level += 1
-            adam.rate = schedule.rate(first_rate, level)
+            adam.rate = first_rate * (1.0 / 3.0) ** level
             adam.reset()
             stopping.resume()
             x, status = start if best is None else best.vector, None

@@ -9,7 +9,7 @@ import time
 import numpy as np
 import pytest
 
-from mfo_backend.fit.paper.loop import SCHEDULES, run_stage
+from mfo_backend.fit.paper.loop import run_stage
 from mfo_backend.render.pictures.interruptible import InterruptibleRenderer, NativeThread
 from mfo_backend.render.pictures.pass_counter import PassCounter
 from mfo_backend.render.pictures.renderer import Interrupted
@@ -110,7 +110,7 @@ def test_a_stage_keeps_its_best_values_when_interrupted(where: str) -> None:
         grey.start,
         Adam(grey.table.lower, grey.table.upper, 0.02),
         rules=StoppingRules(patience=10, max_iterations=50),
-        schedule=SCHEDULES["constant"],
+        levels=1,
         seed=0,
         spp=1,
         on_step=steps.append,
