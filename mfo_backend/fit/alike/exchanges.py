@@ -42,20 +42,15 @@ DARK_ALBEDO, DARK_F0 = 0.05, 0.1  # black plastic and grey metal look alike belo
 def best_basin(solve: SolveBelow, found: Solution, table: ParameterTable) -> Solution:
     """`found`, or a solution that costs clearly less."""
     for _ in range(MOST_MOVES):
-        better = _better(solve, found, table)
+        if found.equations.cost <= SOLVED:
+            break
+        limit = CLEARLY_LOWER * found.equations.cost
+        solutions = (solve(table.clip(start), limit) for start in moved(found.x, table))
+        better = next((other for other in solutions if other.equations.cost < limit), None)
         if better is None:
             break
         found = better
     return found
-
-
-def _better(solve: SolveBelow, found: Solution, table: ParameterTable) -> Solution | None:
-    known = found.equations.cost
-    if known <= SOLVED:
-        return None
-    limit = CLEARLY_LOWER * known
-    solutions = (solve(table.clip(start), limit) for start in moved(found.x, table))
-    return next((other for other in solutions if other.equations.cost < limit), None)
 
 
 def moved(x: Vector, table: ParameterTable) -> Iterator[Vector]:
