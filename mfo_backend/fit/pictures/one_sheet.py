@@ -4,7 +4,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -66,34 +66,23 @@ def one_sheet(
             check_finite(reference.pixels, "The reference")
         except BadInputError as error:
             raise BadInputError(f"Picture {label}: {error}") from error
+    display, notes, shown = None, [], [reference.pixels for reference in references]
     if all(reference.encoding is Encoding.LINEAR for reference in references):
         light = [float(luminance(np.maximum(r.pixels, 0.0))[m].mean()) for r, m in zip(references, masks, strict=True)]
         gains = [light[0] / level if level > 0.0 else 1.0 for level in light]
-        of_materials = _of_materials(renderers, gains, labels)
-        sheet = of_materials[0].sheet
-        pixels = sheet.radiance([reference.pixels for reference in references])
-        counts = _counts(sheet, references)
-        return SheetTask(of_materials, Image(pixels.astype(np.float32), Encoding.LINEAR, counts=counts), None)
-    of_display = [n for n, reference in enumerate(references) if reference.encoding is Encoding.SRGB]
-    display, notes = views[of_display[0]], []
-    gains = [_gain(views[n] if n in of_display else display, display, labels[n]) for n in range(len(references))]
-    shown = []
-    for label, reference in zip(labels, references, strict=True):
-        if reference.encoding is Encoding.LINEAR:
-            notes.append(_WHITE_LOST.format(label=label))
-            reference = replace(reference, pixels=display.display(np.maximum(reference.pixels, 0.0)).astype(np.float32))
-        shown.append(reference.pixels)
-    of_materials = _of_materials(renderers, gains, labels)
+    else:
+        of_display = [n for n, reference in enumerate(references) if reference.encoding is Encoding.SRGB]
+        display = views[of_display[0]]
+        gains = [_gain(views[n] if n in of_display else display, display, labels[n]) for n in range(len(references))]
+        for n, label in enumerate(labels):
+            if n not in of_display:
+                notes.append(_WHITE_LOST.format(label=label))
+                shown[n] = display.display(np.maximum(shown[n], 0.0)).astype(np.float32)
+    of_materials = tuple(SheetRenderer(of_one, gains, labels) for of_one in zip(*renderers, strict=True))
     sheet = of_materials[0].sheet
-    whole = Image(sheet.put(shown), Encoding.SRGB, counts=_counts(sheet, references))
-    return SheetTask(of_materials, whole, display, tuple(notes))
-
-
-def _of_materials(
-    renderers: Sequence[Sequence[MitsubaRenderer]], gains: Sequence[float], labels: Sequence[str]
-) -> tuple[SheetRenderer, ...]:
-    """A sheet's renderer for each material, from those of each picture."""
-    return tuple(SheetRenderer(of_one, gains, labels) for of_one in zip(*renderers, strict=True))
+    pixels = sheet.radiance(shown).astype(np.float32) if display is None else sheet.put(shown)
+    encoding = Encoding.LINEAR if display is None else Encoding.SRGB
+    return SheetTask(of_materials, Image(pixels, encoding, counts=_counts(sheet, references)), display, tuple(notes))
 
 
 def _counts(sheet: ContactSheet, references: Sequence[Image]) -> NDArray[np.bool_] | None:
