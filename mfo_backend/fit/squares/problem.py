@@ -16,7 +16,7 @@ from ...solve.bounded_least_squares import NormalEquations
 from ...types.parameter import ParameterTable
 from ..tolerances import DIM_FLOOR
 from .recording_noise import rows_of_samples, unbiased_equations
-from .residuals import Residual, normal_equations
+from .residuals import Residual, Rows, normal_equations
 
 
 @dataclass(frozen=True)
@@ -41,22 +41,14 @@ class Problem:
         return unbiased_equations(self.evaluate.samples, self.residual, self.near)
 
     def own_noise(self, x: Vector) -> float:
-        """Root mean square noise of the recording in a group at `x`, relative to the radiance and a tenth of its mean.
-
-        0 for a recording with one sample of the light.
-        """
+        """Relative noise of the recording in a group at `x`, 0 for a recording with one sample of the light."""
         two = self.evaluate.samples(x)
-        if two.half_difference is None:
-            return 0.0
-        radiance = np.abs(two.mean[:, :, 0])
-        return float(
-            np.sqrt(np.mean(np.square(two.half_difference[:, :, 0] / (radiance + DIM_FLOOR * radiance.mean() + 1e-12))))
-        )
+        return 0.0 if two.half_difference is None else _relative(two.half_difference[:, :, 0], two.mean[:, :, 0])
 
     def change(self, before: Vector, after: Vector) -> float:
-        """Root mean square change of the groups, relative to their radiance and a tenth of its mean."""
+        """Relative change of the groups."""
         old, new = (self.evaluate(x)[:, :, 0] for x in (before, after))
-        return float(np.sqrt(np.mean(np.square((new - old) / (np.abs(new) + DIM_FLOOR * np.abs(new).mean() + 1e-12)))))
+        return _relative(new - old, new)
 
     def own_share(self, x: Vector) -> float:
         """Part of the mean square residual at `x` that is the recording's own noise, 0 for one sample of the light."""
@@ -70,6 +62,12 @@ class Problem:
     def independent(self) -> float:
         """Number of independent residuals: the channels of a group share most of their noise."""
         return 1.5 * len(self.groups)
+
+
+def _relative(difference: Rows, radiance: Rows) -> float:
+    """Root mean square of a difference (g, 3), relative to the radiance and a tenth of its mean."""
+    level = np.abs(radiance)
+    return float(np.sqrt(np.mean(np.square(difference / (level + DIM_FLOOR * level.mean() + 1e-12)))))
 
 
 @dataclass(frozen=True)
