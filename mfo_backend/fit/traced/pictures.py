@@ -133,12 +133,10 @@ class TracedTiles:
         return recount(self.counts, comparison, self._linear(x, pixels, seed))
 
     def _linear(self, x: Vector, pixels: NDArray[np.int64], seed: int) -> TwoPictures:
-        twice = np.concatenate([pixels, pixels])
+        plain = replace(self, counts=None)
 
         def pictures(samples: int, stream: int) -> NDArray[np.float32]:
-            images = self.paths.images(
-                x[None], twice, seed=seed + stream, samples=samples, jacobian=False, should_stop=self.should_stop
-            )
+            images = plain.tables(pixels, x[None], seed + stream, samples, jacobian=False)
             return images[0, ..., 0].reshape(2, -1, 3)
 
         return pictures

@@ -125,8 +125,7 @@ def _relative_variance(seen: NDArray[np.float32], halves: Vector, pixels: NDArra
     From residuals of neighbours, as a misfit cancels there in part: the reference's noise and half of the model's.
     """
     model = halves.mean(axis=0)
-    inside, shown = _in_picture(model, pixels, shape)
-    total, count = (sums_around(picture, COUNT_REACH) for picture in (shown, inside.astype(np.float64)))
+    total, count = _around(model, pixels, shape)
     level = (total / np.maximum(count, 1.0)[..., None]).reshape(-1, 3)[pixels] + DIM_FLOOR * float(model.mean())
     residual = (seen - model) / np.maximum(level, 1e-30)
     here, there = neighbour_pairs(pixels, shape)
@@ -135,19 +134,16 @@ def _relative_variance(seen: NDArray[np.float32], halves: Vector, pixels: NDArra
 
 def _local_noise(variance: Vector, pixels: NDArray[np.int64], shape: Shape) -> Pixels:
     """Variances (p, 3) averaged with those around them, and nowhere near 0: (height, width, 3)."""
-    inside, shown = _in_picture(variance, pixels, shape)
     mean = variance.mean(axis=0)
-    total, count = (sums_around(picture, COUNT_REACH) for picture in (shown, inside.astype(np.float64)))
+    total, count = _around(variance, pixels, shape)
     return ((total + PRIOR * mean) / (count + PRIOR)[..., None] + FLOOR * mean).astype(np.float32)
 
 
-def _in_picture(
-    values: Vector, pixels: NDArray[np.int64], shape: Shape
-) -> tuple[NDArray[np.bool_], NDArray[np.float64]]:
-    """Which pixels (height, width) have values (p, n), and these (height, width, n), 0 elsewhere."""
-    inside, shown = np.zeros(shape, bool), np.zeros((*shape, values.shape[1]))
-    inside.ravel()[pixels], shown.reshape(-1, values.shape[1])[pixels] = True, values
-    return inside, shown
+def _around(values: Vector, pixels: NDArray[np.int64], shape: Shape) -> tuple[Vector, Vector]:
+    """Sums (height, width, n) of the values (p, n) of pixels around each one, and how many have values there."""
+    inside, shown = np.zeros(shape), np.zeros((*shape, values.shape[1]))
+    inside.ravel()[pixels], shown.reshape(-1, values.shape[1])[pixels] = 1.0, values
+    return sums_around(shown, COUNT_REACH), sums_around(inside, COUNT_REACH)
 
 
 @dataclass(frozen=True)
