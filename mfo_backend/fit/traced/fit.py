@@ -96,8 +96,7 @@ class TracedRoute:
         if not should_stop():
             self._look(raced_to[0])
         if not should_stop():
-            polishing = polish(setting, raced_to)
-            ends, pictures = polishing.ends, polishing.pictures
+            ends, pictures = polish(setting, raced_to)
             candidates = [end.x for end in reversed(ends)] + found
             chosen = choose_end(pictures, candidates, self._plan, seed, Stream.CHOOSE)
             raced = chosen == len(ends)

@@ -4,7 +4,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -38,17 +38,10 @@ COUNTED_STEPS = 3  # between them
 STILL = 0.25  # relative change of a count
 
 
-@dataclass(frozen=True)
-class Polishing:
-    """Ends of a polish, the last with most values back at the user's, and the pictures they were compared by."""
-
-    ends: tuple[Polished, ...]
-    pictures: TracedTiles
-
-
-def polish(setting: Setting, raced: Sequence[Vector]) -> Polishing:
+def polish(setting: Setting, raced: Sequence[Vector]) -> tuple[list[Polished], TracedTiles]:
     """Stage `polish`: Gauss-Newton steps from the best end of a race, each with new random numbers.
 
+    Its ends, the last with most values back at the user's, and the pictures they were compared by.
     Where lobes are free, the first end has their details as in the scene; another has all values free but those of
     lobes that the first did not need. Where the picture does not determine some of these or does not need some lobes,
     an end with those as in the scene follows, and one more where that leaves further values without effect.
@@ -81,7 +74,7 @@ def polish(setting: Setting, raced: Sequence[Vector]) -> Polishing:
             end = _pool(setting, stage, np.where(kept, user, last.x), kept, stream)
             ends.append(replace(end, unseen=last.unseen | unseen))
         stage.vector = ends[-1].x
-    return Polishing(tuple(ends), setting.pictures)
+    return ends, setting.pictures
 
 
 def _coated(setting: Setting, x: Vector) -> Vector:

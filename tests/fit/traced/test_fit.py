@@ -11,7 +11,7 @@ from mfo_backend.fit.recover_material import recover_material
 from mfo_backend.fit.settings import FitSettings
 from mfo_backend.fit.traced import fit as traced_fit
 from mfo_backend.fit.traced import sample_count as equal_counts
-from mfo_backend.fit.traced.polish import MOST_SAMPLES, Polishing
+from mfo_backend.fit.traced.polish import MOST_SAMPLES
 from mfo_backend.fit.traced.polished import Polished
 from mfo_backend.fit.traced.sample_pools import TilePools
 from mfo_backend.types.certainty import Level
@@ -103,7 +103,7 @@ def test_values_go_back_to_the_users_only_where_no_eye_sees_it(tmp_path, monkeyp
     none = np.zeros_like(unseen)
     ends = [Polished(good, 1e-6 * variance + np.diag(unseen) * variance, none, none, None, variance),
             Polished(kept, 1e-6 * variance, unseen, unseen, None, variance)]  # fmt: skip
-    monkeypatch.setattr(traced_fit, "polish", lambda setting, raced: Polishing(tuple(ends), setting.pictures))
+    monkeypatch.setattr(traced_fit, "polish", lambda setting, raced: (list(ends), setting.pictures))
     monkeypatch.setattr(traced_fit, "choose_end", lambda *given: 0)  # squares under fireflies cannot tell
     result, _ = fit(renderer, renderer.image(good, seed=5, spp=64))
     assert result.certainty["roughness"].level is Level.NOT_TOLD_APART
