@@ -6,7 +6,7 @@ from __future__ import annotations
 import time
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
-from typing import Any, Protocol
+from typing import Any
 
 from ..metrics.display.tone_mapping import View
 from ..render.paths.recorded_scene import RecordedScene
@@ -33,25 +33,11 @@ from .result.outcome import Candidate, FitOutcome, RouteEnds, final_result
 from .settings import FitSettings
 from .traced.fit import TracedRoute
 
-
-class Route(Protocol):
-    """One way to fit, made ready: its constructor has refused what it cannot hold."""
-
-    stages: tuple[str, ...]
-
-    @property
-    def verification(self) -> Verifier:
-        """Renders the pictures by which the ends are judged."""
-        ...
-
-    def fit(self) -> RouteEnds:
-        """Run the stages; raises `UnrecordableError` where another route has to do it."""
-        ...
-
-
+# One way to fit, made ready: its constructor, or the fit, raises `UnrecordableError` where another route has to do it
+_Route = RecordedRoute | TracedRoute | PaperRoute
 _ONE_PICTURE = "Leave out all pictures but one, or choose the preset 'paper'."
 _Says = Callable[[tuple[str, ...]], str]  # what a route does that stands in for another, by its stages' names
-_Way = tuple[Callable[[], Route], _Says]
+_Way = tuple[Callable[[], _Route], _Says]
 
 
 def recover_material(
@@ -158,7 +144,7 @@ def _ways(
         )
 
 
-def _fit_along(route: Route, task: FitTask, reasons: Sequence[str], says: _Says, *, judged: bool) -> FitOutcome:
+def _fit_along(route: _Route, task: FitTask, reasons: Sequence[str], says: _Says, *, judged: bool) -> FitOutcome:
     """Fit, verify the ends by new random numbers, choose the best, and make the result.
 
     `reasons` say why the routes before this one could not do it.
@@ -174,7 +160,8 @@ def _fit_along(route: Route, task: FitTask, reasons: Sequence[str], says: _Says,
     if judged and best and status is not Status.CANCELLED:
         found, pictures = _smoothed(found, pictures, best, renderer, route.verification)
     if pictures is not found.unverified:
-        pictures = [*pictures[:best], route.verification.finished(pictures[best]), *pictures[best + 1 :]]
+        picture: Any = pictures[best]  # of the kind that the route's verification makes
+        pictures = [*pictures[:best], route.verification.finished(picture), *pictures[best + 1 :]]
         task.listener(Preview(pictures[best].image))
     first, end = pictures[0], pictures[best]
     task = task.only_counted(end.image)
