@@ -35,7 +35,9 @@ SIGNIFICANT = 9.0
 # more trials. Smaller: likely rivals are not named.
 HOPELESS = 60.0
 # Standard deviation, of the range of a value, below which it is called determined. Of a value that spans [0, 1] two
-# such steps are hard to tell apart by eye. Larger: more is promised than an eye would grant.
+# such steps are hard to tell apart by eye. Two solved ends, which lie as near to their minimum as a solve comes, are
+# one material unless they are further apart. Larger: more is promised than an eye would grant, and a rival is taken for
+# the result itself. Smaller: the result is named as its own rival.
 DETERMINED_BELOW = 0.02
 # The same below which it is weak; above, the picture does not show it, and it goes back to the user's. Larger: values
 # that only noise has chosen stay. Smaller: values that the picture shows go back. No measurement.
@@ -87,9 +89,6 @@ TELLING = 0.05
 # Starts and solutions further apart are followed both. Larger: a second basin is taken for the first. Smaller: one
 # basin is solved twice. No measurement.
 ANOTHER_BASIN = 0.1
-# Of two solved ends, which lie as near to their minimum as a solve comes: further apart they are two materials.
-# Larger: a rival is taken for the result itself. Smaller: the result is named as its own rival. No measurement.
-ANOTHER_MATERIAL = 0.02
 # Largest roughness of an end that is asked by a picture whether it is a mirror. Chrome of roughness 0 ended at 0.052 to
 # 0.069 by Cycles' pictures of a ball and a head; pictures told 0.1 from none by two standard errors and more
 # (docs/notebook/recorded_paths.md). Larger: a picture more of materials that are none. Smaller: chrome keeps a blur.

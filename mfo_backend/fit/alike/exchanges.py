@@ -23,7 +23,7 @@ from ...solve.bounded_least_squares import Solution
 from ...types.parameter import ParameterTable, Vector
 from ..search.global_start import OPPOSITE
 from ..squares.problem import Problem, Rival
-from ..tolerances import ANOTHER_MATERIAL, BOX_SD, CLEARLY_LOWER, HOPELESS, MODEL_ERROR, OFF
+from ..tolerances import BOX_SD, CLEARLY_LOWER, DETERMINED_BELOW, HOPELESS, MODEL_ERROR, OFF
 from .compare import compare
 from .simplest import exchangeable, exchanged
 
@@ -91,7 +91,7 @@ def metal_rivals(
     cost = found.equations.cost
     most = _out_of_reach(problem, cost)
     other = solve(table.clip(start), most)
-    if other.equations.cost > most or table.apart(other.x, found.x) < ANOTHER_MATERIAL:
+    if other.equations.cost > most or table.apart(other.x, found.x) < DETERMINED_BELOW:
         return found, ()
     if other.equations.cost < cost:
         found, other = other, found

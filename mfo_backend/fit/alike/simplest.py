@@ -15,7 +15,7 @@ import numpy as np
 from ...material.principled.blender_selection import AMOUNT_OF
 from ...types.parameter import ParameterTable, Vector
 from ..squares.problem import Problem, Refined, Rival
-from ..tolerances import ANOTHER_MATERIAL, HOPELESS, SIGNIFICANT
+from ..tolerances import DETERMINED_BELOW, HOPELESS, SIGNIFICANT
 from .compare import compare
 from .unneeded_lobes import Box, box_holding, is_off, is_plain, values_off
 
@@ -43,7 +43,7 @@ class OtherEnds:
             return found
         box = box_holding(table, self._user, found.off)
         end = self._attempt(found, np.clip(exchanged(x, table), *box), box)
-        if end is None or table.apart(end, x) < ANOTHER_MATERIAL:
+        if end is None or table.apart(end, x) < DETERMINED_BELOW:
             return found
         if is_off(COAT[0], end, table) and COAT[0] in values_off(table, self._user):
             return found  # which is simpler: `_without_lobes` comes there, too
