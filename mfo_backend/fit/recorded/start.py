@@ -3,7 +3,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -12,7 +11,6 @@ from numpy.typing import NDArray
 from ...render.camera.primary_rays import TILE
 from ...render.paths.recorded_paths import LaneGroups
 from ...render.paths.recorded_scene import MOST_LANES
-from ...solve.bounded_least_squares import Solution
 from ...types.errors import UnrecordableError
 from ..result.course import Stage
 from ..search.global_start import ROUGHER_WIDTH, agreeing_ends, best_starts, random_start, scan
@@ -71,7 +69,10 @@ def start_from_nothing(setting: Setting) -> Started:
         more = recording.problem(fewer_groups(groups, setting.reference, lanes), make, calm=True)
         users = [placed(setting.user, scale) for scale in scales]
         others = [*users, placed(random_start(setting.table, setting.seed), scales[0])]
-        basins = _race(setting, more, [*starts, *others], stage)
+        basins = race(
+            lambda x, evaluations, known: solve(setting, more, x, evaluations, stage=stage, known=known),
+            [*starts, *others], setting.table, plan, course.should_stop,
+        )  # fmt: skip
         if not np.isfinite(basins[0].equations.cost):
             raise UnrecordableError("No start of the fit gives finite numbers on the recorded light paths.")
         stage.vector = basins[0].x
@@ -118,10 +119,3 @@ def _starts(setting: Setting, problem: Problem, stage: Stage, scale: Placed) -> 
         nodes = scan(setting.course.watch(stage, problem.equations), table, scanned)
         starts = [placed(start, scale) for start in best_starts(nodes, plan.starts)]
     return starts
-
-
-def _race(setting: Setting, problem: Problem, starts: Sequence[Vector], stage: Stage) -> list[Solution]:
-    def attempt(start: Vector, evaluations: int, known: float) -> Solution:
-        return solve(setting, problem, start, evaluations, stage=stage, known=known)
-
-    return race(attempt, starts, setting.table, setting.plan, setting.course.should_stop)
