@@ -20,7 +20,6 @@ from ...types.certainty import Certainty
 from ...types.image import Pixels
 from ...types.result import Contradiction, NextPicture
 from ..alike.compare import compare
-from ..alike.unneeded_lobes import box_holding
 from ..certainty.covariance import certainties_away
 from ..certainty.weak_combinations import weak_combinations
 from ..judge.fit_task import FitTask
@@ -209,25 +208,21 @@ class RecordedRoute:
     ) -> tuple[list[End], list[str], Callable[[Pixels], float]]:
         """The ends of the perceptual stages where these have something to do, sentences, and what a picture counts."""
         task, plan, settings = self._task, self._plan, self._task.settings
-        setting, problem, noise = end.recording.setting, end.refined.all, end.noise
+        setting, blurred = end.recording.setting, False
         if not self._finishing:
             return [], [], _misfit(end)
         if settings.losses is None and task.linear:
             # under lights with extent residuals are in deviations of the noise
-            left = np.inf if setting.sampled else float(np.sqrt(2.0 * problem.equations(kept.x).cost))
+            left = np.inf if setting.sampled else float(np.sqrt(2.0 * end.refined.all.equations(kept.x).cost))
             if left < plan.seen_rms:
                 return [], [NOTHING_SEEN.format(100 * left)], _misfit(end)
             deviations, noise = end.recording.whole.misfit(kept.x)
             if deviations < AT_NOISE:
                 return [], [NOTHING_BUT_NOISE.format(100 * noise.level)], _misfit(end)
-        may_blur = task.linear and settings.losses is None
-        blurred = may_blur and (setting.sampled or (noise is not None and noise.level > NOISY))
+            blurred = setting.sampled or noise.level > NOISY
         judge = task.judge(task.light, blurred=blurred)
-        box = box_holding(setting.table, setting.user, kept.held)
         basins = others if settings.preset == "best" else []
-        later, notes = perceptual_ends(
-            end.recording.whole, problem, kept.x, basins, box, self._finishing, judge, settings
-        )
+        later, notes = perceptual_ends(end, kept, basins, self._finishing, judge, settings)
         return later, notes, judge.value
 
     def _unless_seen(self, asked: int, choose: Callable[..., Choice]) -> Callable[..., Choice]:

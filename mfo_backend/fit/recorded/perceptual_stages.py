@@ -10,7 +10,7 @@ from functools import partial
 import numpy as np
 
 from ...types.image import Pixels
-from ..alike.unneeded_lobes import Box
+from ..alike.unneeded_lobes import Box, box_holding
 from ..judge.minimise_flip import minimise_flip
 from ..judge.picture_judge import PictureJudge
 from ..plans import PERCEPTUAL_EVALUATIONS
@@ -19,7 +19,9 @@ from ..search.race_starts import different
 from ..settings import FitSettings
 from ..squares.problem import Problem
 from ..squares.residuals import MakeResidual
+from .keep_user_values import Kept
 from .recording import Recording, Vector
+from .refine import OnRecording
 from .solve import solve, solve_within
 
 FLIP_STARTS = 2
@@ -27,23 +29,22 @@ FINALISTS = 2  # ends that are path-traced besides the start and the end of the 
 
 
 def perceptual_ends(
-    recording: Recording,
-    problem: Problem,
-    start: Vector,
+    end: OnRecording,
+    kept: Kept,
     basins: Sequence[Vector],
-    box: Box,
     residuals: Mapping[str, MakeResidual],
     judge: PictureJudge,
     settings: FitSettings,
 ) -> tuple[list[End], list[str]]:
-    """The best ends of the perceptual stages from `start` and other `basins`, by the judge on recorded pictures, and
-    sentences on what was left out.
+    """The best ends of the perceptual stages from what was `kept` of the stage before and from other `basins`, by the
+    judge on recorded pictures, and sentences on what was left out.
 
     Losses that the settings name are a ladder, each from the end of the one before; a preset's own are alternatives.
-    `recording` holds all pixels; `problem` are the residuals of the stage before; `box` holds what the user keeps.
     """
-    setting, flip, notes = recording.setting, settings.preset == "best", []
-    starts = [start, *(solve_within(setting, problem, np.clip(basin, *box), box) for basin in basins)]
+    recording, problem, notes = end.recording.whole, end.refined.all, []
+    setting, flip = recording.setting, settings.preset == "best"
+    box = box_holding(setting.table, setting.user, kept.held)
+    starts = [kept.x, *(solve_within(setting, problem, np.clip(basin, *box), box) for basin in basins)]
     ends = [End("refine", x) for x in starts[1:]]
     for name, make in residuals.items():
         polished = _lower_squares(recording, name, problem, make, starts, box)
@@ -57,7 +58,7 @@ def perceptual_ends(
             notes.append("The picture is too large to be recorded whole: the stage 'flip' was left out.")
         return ends, notes
     if flip and not setting.course.should_stop():
-        nearest = sorted([start, *(end.x for end in ends)], key=lambda x: judge.value(recording.picture(x)))
+        nearest = sorted([kept.x, *(end.x for end in ends)], key=lambda x: judge.value(recording.picture(x)))
         starts = different(nearest, setting.table, FLIP_STARTS)
         ends += [End("flip", x) for x in _lower_flip(recording, judge, starts, box)]
     if len(ends) <= FINALISTS:

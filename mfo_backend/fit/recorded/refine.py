@@ -18,7 +18,6 @@ from ..result.course import Stage
 from ..squares.problem import Problem, Refined
 from ..squares.residuals import log_residual
 from .recording import SAMPLES, Recording, Setting, Vector
-from .reference_noise import TileNoise
 from .solve import better_basin, solve
 from .start import Started
 from .where_to_look import all_groups, fewer_groups, finer_grid, solution_grid
@@ -41,14 +40,10 @@ OWN_LIGHT = 0.01
 
 @dataclass(frozen=True, eq=False)
 class OnRecording:
-    """The end of the stage with the recording it was found on.
-
-    `noise` is that of the reference, where residuals are in deviations of it.
-    """
+    """The end of the stage with the recording it was found on."""
 
     refined: Refined
     recording: Recording
-    noise: TileNoise | None = None
 
 
 def refine_exact(setting: Setting, started: Started) -> OnRecording:
@@ -151,7 +146,7 @@ def _problems(recording: Recording, x: Vector, *, solve_all: bool = False) -> On
     weighing, fewer = (recording.weighing(n, side) for n in (noise, noise.take(some)))
     problem = recording.problem(groups, weighing, near=x)
     few = problem if len(some) == len(groups) else recording.problem(groups.take(some), fewer, near=x)
-    return OnRecording(Refined(x, problem, few), recording, noise)
+    return OnRecording(Refined(x, problem, few), recording)
 
 
 def _last_steps(setting: Setting, stage: Stage, refined: Refined) -> Refined:
