@@ -48,7 +48,6 @@ class Highlights:
 
 def highlight_cells(
     scene: mi.Scene,
-    shape: mi.Shape,
     cells: PixelCells,
     rays_in: Callable[[PixelCells], PrimaryRays],
     first_hits: Callable[[PrimaryRays], tuple[mi.SurfaceInteraction3f, mi.Bool]],

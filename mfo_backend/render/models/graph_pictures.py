@@ -139,7 +139,6 @@ class GraphPictures:
             self._rendered, lambda vector: self.state(vector).pictures, lambda: self._is_seen, self._width
         )
         self._seen: tuple[Picture, NDArray[np.float64]] | None = None
-        self.renders = 0
 
     def seen(self, vector: Vector) -> tuple[Picture, NDArray[np.float64]]:
         """World positions of the subpixels of `state`, and the camera's matrix."""
@@ -174,7 +173,6 @@ class GraphPictures:
 
     def plain(self, vectors: Sequence[Vector]) -> list[Mapping[str, NDArray[np.float32]]]:
         """Flat pictures by parameter at each vector, without derivatives."""
-        self.renders += 1
         variants = [(self._as_values(vector), self._sockets) for vector in vectors]
         found = self._evaluate(variants, scale=self._scale, samples=1)
         seen = np.isfinite(found.positions).all(axis=2).ravel()
@@ -241,7 +239,6 @@ class GraphPictures:
         return np.isfinite(self._seen[0]).all(axis=2)
 
     def _rendered(self, vector: Vector) -> Mapping[str, Shown]:
-        self.renders += 1
         variants = [(self._as_values(vector), self._sockets)]
         found = self._evaluate(variants, scale=self._fine_scale, samples=FINE_SAMPLES, elsewhere=True)
         seen = np.isfinite(found.positions).all(axis=2).ravel()
@@ -258,7 +255,6 @@ class GraphPictures:
             there = vector.copy()
             there[j] += step
             variants.append((self._as_values(there), self._components[j][0].sockets))
-        self.renders += 1
         found = self._evaluate(variants, scale=self._scale, samples=1)
         self._seen = found.positions, found.camera
         seen = np.isfinite(found.positions).all(axis=2).ravel()

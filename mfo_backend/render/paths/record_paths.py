@@ -179,7 +179,7 @@ def _camera_rays(scene: mi.Scene, shape: mi.Shape, settings: RecordSettings, wid
         return _turned(shape, settings, _facing(scene, shape, settings, si)), ends.on_target
 
     cells = PixelCells.grid((per_axis + 1) // 2)
-    return rays_in(highlight_cells(scene, shape, cells, rays_in, hits_of, settings.highlights))
+    return rays_in(highlight_cells(scene, cells, rays_in, hits_of, settings.highlights))
 
 
 def _without_parametrisation(si: mi.SurfaceInteraction3f, *, own_normal: bool) -> mi.SurfaceInteraction3f:
