@@ -233,8 +233,7 @@ def _judged(task: FitTask, result: FitResult, first: Candidate, end: Candidate, 
     if not stopped:
         result, shown = judge.judged(result)
         end = first if shown is first.image else end  # the gap below is that of what is shown
-    halves = _halves(task, end)
-    if halves is not None and not stopped:
-        result = with_gap(result, task, halves)
+        halves = _halves(task, end)
+        result = result if halves is None else with_gap(result, task, halves)
     result = replace(result, seconds=time.monotonic() - task.began)  # a verdict takes time as well
-    return FitOutcome(result, first.image, end.image, task.counted, halves)
+    return FitOutcome(result, first.image, end.image, task.counted)

@@ -97,7 +97,7 @@ def fit_together(
             result = replace(result, status=Status.CANCELLED, message=Status.CANCELLED.sentence)
         else:
             result = with_gap(result, task.only_counted(end), halves)
-        outcomes.append(FitOutcome(result, start, end, task.counted, halves))
+        outcomes.append(FitOutcome(result, start, end, task.counted))
     return Together(tuple(outcomes), turns.rounds)
 
 

@@ -104,14 +104,12 @@ class FitOutcome:
     """The result of a fit with the pictures of its start and its end, scene-linear and under one seed.
 
     The fit looked at the pixels that are `counted`, True (height, width); others may have fewer samples.
-    `result_halves` are two pictures of the end whose random numbers have nothing in common, where there are such.
     """
 
     result: FitResult
     start_image: Pixels = field(repr=False)
     result_image: Pixels = field(repr=False)
     counted: NDArray[np.bool_] = field(repr=False)
-    result_halves: tuple[Pixels, Pixels] | None = field(default=None, repr=False)
 
 
 def listed(words: Sequence[str]) -> str:

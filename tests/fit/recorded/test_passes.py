@@ -64,7 +64,8 @@ def test_what_is_traced_for_a_large_ball_under_two_lamps(tmp_path, monkeypatch):
     )
     x = renderer.table.pack({"base_color": (0.7, 0.25, 0.1), "roughness": 0.35, "metallic": 0.3})
     reference = renderer.pixels_later(x, np.arange(256 * 256), seed=5, spp=64)().reshape(256, 256, 3)
-    recorded, launched, shown = [], [], []
+    recorded, launched, shown, compared = [], [], [], []
+    monkeypatch.setattr("mfo_backend.fit.judge.model_gap.model_gap", lambda *of: compared.append(of[1]))
     record, pixels_later = RecordedScene.record, renderer.pixels_later
     monkeypatch.setattr(
         RecordedScene, "record", lambda self, *args, **more: recorded.append(1) or record(self, *args, **more)
@@ -85,6 +86,6 @@ def test_what_is_traced_for_a_large_ball_under_two_lamps(tmp_path, monkeypatch):
     assert len(recorded) <= 2  # some of the pixels, and all of them for values that may go back to the user's
     # a part of four for start and end, of both halves, and for each look
     assert launched == [4] * (2 + looks)
-    first, second = (half[renderer.target_mask()] for half in outcome.result_halves)
+    first, second = (half[renderer.target_mask()] for half in compared[0])
     # 0.1 %, and 0.7 % where each sample draws a lamp
     assert np.median(np.abs(first - second)) < 0.003 * np.median(first)
