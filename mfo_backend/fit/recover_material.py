@@ -36,8 +36,7 @@ from .traced.fit import TracedRoute
 # One way to fit, made ready: its constructor, or the fit, raises `UnrecordableError` where another route has to do it
 _Route = RecordedRoute | TracedRoute | PaperRoute
 _ONE_PICTURE = "Leave out all pictures but one, or choose the preset 'paper'."
-_Says = Callable[[tuple[str, ...]], str]  # what a route does that stands in for another, by its stages' names
-_Way = tuple[Callable[[], _Route], _Says]
+_Way = tuple[Callable[[], _Route], str]  # and what is said of a route that stands in for another
 
 
 def recover_material(
@@ -103,9 +102,9 @@ def recover_material(
     task = check_task(renderer, reference, settings, display, listener, should_stop)
     task = replace(task, nearer_than=nearer_than, candidates=candidates, noted=noted)
     reasons: list[str] = []
-    for make, why in _ways(task, plan, begin, recorded, hand_over=hand_over):
+    for make, says in _ways(task, plan, begin, recorded, hand_over=hand_over):
         try:
-            return _fit_along(make(), task, reasons, why, judged=judged)
+            return _fit_along(make(), task, reasons, says, judged=judged)
         except UnrecordableError as error:
             reasons.append(str(error))
     if task.sheet is not None:
@@ -126,28 +125,23 @@ def _ways(
     ours = renderer if isinstance(renderer, MitsubaRenderer | SheetRenderer) and settings.preset != "paper" else None
     no_losses = ""
     if ours is not None:
-        yield lambda: RecordedRoute(task, ours, plan, begin, recorded), lambda stages: ""
+        yield lambda: RecordedRoute(task, ours, plan, begin, recorded), ""
         if ours.graph is not None:  # no other way has the slopes of values inside nodes
             return
         if settings.losses is None:
-            yield (
-                lambda: TracedRoute(task, ours, begin),
-                lambda stages: f"So whole light paths were traced, by the stages {', '.join(map(repr, stages))}.",
-            )
+            yield lambda: TracedRoute(task, ours, begin), "So whole light paths were traced, by the stages {stages}."
         else:
             no_losses = "The stages on whole light paths know no losses of the user's choice. "
     if ours is None or (hand_over and task.sheet is None):  # over several pictures the loop takes too long to stand in
         of_paper = replace(task, settings=replace(settings, preset="paper"))
-        yield (
-            lambda: PaperRoute(of_paper),
-            lambda stages: f"{no_losses}So the preset 'paper' was used instead of {settings.preset!r}.",
-        )
+        said = f"{no_losses}So the preset 'paper' was used instead of {settings.preset!r}."
+        yield lambda: PaperRoute(of_paper), said
 
 
-def _fit_along(route: _Route, task: FitTask, reasons: Sequence[str], says: _Says, *, judged: bool) -> FitOutcome:
+def _fit_along(route: _Route, task: FitTask, reasons: Sequence[str], says: str, *, judged: bool) -> FitOutcome:
     """Fit, verify the ends by new random numbers, choose the best, and make the result.
 
-    `reasons` say why the routes before this one could not do it.
+    `reasons` say why the routes before this one could not do it, and `says` what it does instead.
     """
     renderer = task.renderer
     start = route.verification.begin(renderer.start)  # rendered while the kernels of the fit are compiled
@@ -173,7 +167,7 @@ def _fit_along(route: _Route, task: FitTask, reasons: Sequence[str], says: _Says
         status=Status.CANCELLED if task.should_stop() else status,
         errors=judge.errors,
         began=task.began,
-        notes=[" ".join([*reasons, says(route.stages)])] if reasons else [],
+        notes=[" ".join([*reasons, says.format(stages=", ".join(map(repr, route.stages)))])] if reasons else [],
     )
     if not judged:
         return FitOutcome(result, first.image, end.image, task.counted)

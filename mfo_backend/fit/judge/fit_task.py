@@ -47,7 +47,7 @@ class FitTask:
     nearer_than
         FLIP beyond noise that a fit from another class has to come below; None where there is none before it.
     candidates
-        The scene's other cameras and lights, from which a further picture could be.
+        The scene's other cameras and lights, from which a further picture could be proposed.
     noted
         Whether the export has left something out, which may be why a result does not match.
     """
