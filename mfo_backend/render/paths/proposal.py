@@ -16,7 +16,7 @@ import mitsuba as mi
 # Of the samples, about the normal of a coat. A coat's bump was 0.79 % too dark without and 0.36 % with it (96 x 96,
 # docs/notebook/graph_values.md); other shares were not tried. Larger: what is below the coat has more noise.
 COAT_SHARE = 0.2
-LEAST_COAT, ROUGH_COAT = 0.03, 0.1  # roughness: the least of `around`, and where nodes give it. No measurement
+LEAST_ROUGHNESS, ROUGH_COAT = 0.03, 0.1  # the least of a narrow lobe, and a coat's where nodes give it. No measurement
 
 
 @dataclass(frozen=True)
@@ -43,7 +43,7 @@ class DefensiveProposal:
     @staticmethod
     def around(roughness: float) -> DefensiveProposal:
         """A proposal for a material whose main lobe has this roughness."""
-        narrow = min(max(roughness, 0.03), 1.0)
+        narrow = min(max(roughness, LEAST_ROUGHNESS), 1.0)
         return DefensiveProposal((narrow, min(2.0 * narrow, 1.0), 0.1, 0.5), (0.45, 0.15, 0.05, 0.1))
 
     def with_coat(self, roughness: object) -> DefensiveProposal:
@@ -61,7 +61,7 @@ class DefensiveProposal:
     @property
     def _of_coat(self) -> mi.MicrofacetDistribution:
         assert self.coat_roughness is not None
-        alpha = dr.opaque(mi.Float, max(self.coat_roughness, LEAST_COAT) ** 2)
+        alpha = dr.opaque(mi.Float, max(self.coat_roughness, LEAST_ROUGHNESS) ** 2)
         return mi.MicrofacetDistribution(mi.MicrofacetType.GGX, alpha, True)
 
     def sample(
