@@ -39,12 +39,12 @@ from .stage_log import StageLog, Step
 _STRIKES = 3  # steps in a row without a finite loss and gradient after which a stage gives up
 
 
-# Rates that a stage goes through, each a third of the one before.
+# Rates that a stage goes through, each so much of the one before.
 # With a constant rate near a minimum Adam walks in steps of about that rate. The best loss stops improving, and the
 # rule of ten iterations ends the stage wherever it happens to be; under FLIP that is often at its very start. With
 # more rates each such stall is answered by going back to the best x with the next one and new moments. The stage ends
 # by the same rule at the last rate.
-LEVELS = {"constant": 1, "decay": 4}
+LEVELS, FALL = {"constant": 1, "decay": 4}, 1.0 / 3.0
 
 
 @dataclass(frozen=True)
@@ -146,7 +146,7 @@ def run_stage(
         may_go_on = level + 1 < levels and stopping.iterations < rules.max_iterations
         if status is Status.STALE and may_go_on:
             level += 1
-            adam.rate = first_rate * (1.0 / 3.0) ** level
+            adam.rate = first_rate * FALL**level
             adam.reset()
             stopping.resume()
             x, status = start if best is None else best.vector, None

@@ -23,7 +23,7 @@ Errors = dict[str, tuple[float, float]]
 
 @dataclass(frozen=True)
 class TaskJudge:
-    """Looks at what a fit began and ended with, by pictures of radiance; of a sheet at all that show the target."""
+    """Judges the pictures of a fit's start and end, which are radiance; of a sheet each one that shows the target."""
 
     task: FitTask
     start: Pixels = field(repr=False)
