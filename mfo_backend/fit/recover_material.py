@@ -65,7 +65,7 @@ def recover_material(
     Parameters
     ----------
     display
-        View of a display-encoded reference; see `metrics.loss.make_loss`.
+        View of a display-encoded reference; see `metrics.losses.loss.make_loss`.
     listener
         Hears the events of `types.event`.
     should_stop

@@ -38,10 +38,10 @@ class FitSettings:
         Material model, and names to fit, ``"all"`` or ``"reduced"``. Model ``"auto"`` is Blender's own where the job
         holds Blender's socket values, else Mitsuba's.
     losses
-        Stages in order by `metrics.loss_names`, each from the result of the one before: any one, two (the paper's
-        method is MSE, then FLIP) or more. A name ending in ``-ldr`` or ``-hdr`` does not follow `range`. The last one
-        judges the result. ``None``: those of the preset. With ``"fast"`` and ``"balanced"`` they are the stages after
-        `refine` and must be sums of squares.
+        Stages in order by `metrics.losses.loss_names`, each from the result of the one before: any one, two (the
+        paper's method is MSE, then FLIP) or more. A name ending in ``-ldr`` or ``-hdr`` does not follow `range`. The
+        last one judges the result. ``None``: those of the preset. With ``"fast"`` and ``"balanced"`` they are the
+        stages after `refine` and must be sums of squares.
     range
         ``"hdr"`` or ``"ldr"`` losses; ``"auto"`` takes HDR for a linear reference.
     seed, spp

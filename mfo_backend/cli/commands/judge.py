@@ -47,7 +47,7 @@ def run(arguments: argparse.Namespace) -> int:
     reference, _notes = read_reference(folder, request)
     view = view_of(folder, request.view, request.view_table, reference)
     picture = read_image(arguments.picture)
-    # at the size and over the pixels of `fit.picture_errors`; the whole picture if there is no result
+    # at the size and over the pixels of `fit.judge.picture_errors`; the whole picture if there is no result
     check_pair(reference.pixels, picture.pixels)
     side, mask = 1, None
     if folder.counted.is_file():

@@ -111,8 +111,8 @@ class Verification:
     """Renders the ends of one fit; all of them see the same random numbers.
 
     A picture goes on where it is looked at: in the pixels that count, and next to them. Where these are many, they are
-    compared at a fraction of the size (`metrics.block_means`), and a pixel needs fewer samples. Differences and noise
-    are compared in the values of the task's view, as every measure of a fit sees them compressed.
+    compared at a fraction of the size (`metrics.flip.block_means`), and a pixel needs fewer samples. Differences and
+    noise are compared in the values of the task's view, as every measure of a fit sees them compressed.
 
     An end's picture has `first` samples at least for a pixel of a comparison, and at most the settings' `verify_spp`
     for one of the picture. The first often say enough: under a noisy reference a picture without noise looks no nearer.

@@ -19,7 +19,7 @@ from .job_folder import JobFolder
 
 @dataclass(frozen=True)
 class ViewTable:
-    """The file of a view's table; `metrics.baked_view.BakedView` has what it holds."""
+    """The file of a view's table; `metrics.display.baked_view.BakedView` has what it holds."""
 
     path: str
     size: int

@@ -87,7 +87,7 @@ class GraphBlender:
     def __call__(
         self, graph: NodeGraph, variants: Sequence[Variant], *, scale: int, samples: int, elsewhere: bool = False
     ) -> Evaluated:
-        """See `render.graph_pictures.Evaluate`; `graph` says what of the copy is looked at, and how it is shown."""
+        """See `render.models.graph_pictures.Evaluate`; `graph` says what of the copy is looked at, and how."""
         where = graph.evaluate
         assert where is not None
         answer = self._ask({

@@ -116,7 +116,7 @@ def _of_material(
 def _write_pictures(picture: JobPicture, seen: SeenPicture) -> dict[str, bytes]:
     """Write what one picture shows into its folder; returns the PNG files by name."""
     folder, reference, view = picture.folder, picture.reference, picture.view
-    side = block_side(seen.counted)  # as `fit.picture_errors`
+    side = block_side(seen.counted)  # as `fit.judge.picture_errors`
     result = means_beside(reference.encoding, Image(seen.result, Encoding.LINEAR), side, view)
     seen_reference = reference
     if reference.counts is not None:

@@ -29,7 +29,7 @@ from .outputs import bytes_needed, write_outputs
 from .stop import StopSignal
 
 # Measured on Linux (docs/reference/reliability.md): Mitsuba, LLVM and the first kernels; libraries and stacks that are
-# mapped but not used; pictures and what the metrics make of them. Rays come on top, see `render.recorded_scene`.
+# mapped but not used; pictures and what the metrics make of them. Rays come on top, see `render.paths.recorded_scene`.
 _STARTUP_BYTES, _MAPPED_BYTES = 150_000_000, 380_000_000
 _BYTES_PER_PIXEL = {"fast": 430, "balanced": 500, "best": 500, "paper": 500}
 _CANCELLED_EARLY = "Cancelled before the fit had begun; nothing was changed."

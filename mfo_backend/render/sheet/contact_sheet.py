@@ -12,8 +12,8 @@ from numpy.typing import NDArray
 from ...types.image import Pixels
 
 # Pixels that begin of a picture is a multiple of, and that at least lie between two: a multiple of every tile's side
-# (`primary_rays.TILE`) and wider than what the filters of FLIP and of a blur (`judge.verification.BLURRED`) reach at a
-# silhouette
+# (`primary_rays.TILE`) and wider than what the filters of FLIP and of a blur (`fit.judge.verification.BLURRED`) reach
+# at a silhouette
 APART = 16
 
 
