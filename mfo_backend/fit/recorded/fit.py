@@ -76,7 +76,7 @@ class RecordedRoute:
     Raises
     ------
     UnrecordableError
-        For materials that recorded paths cannot hold: textures, transmission.
+        For materials that recorded paths cannot hold: what transmits light, an alpha that is free.
     BadInputError
         If one of the settings' losses is not defined for the reference.
     """

@@ -23,6 +23,7 @@ MINIMUM_LIT_SHARE = 0.1  # of the recorded lanes: a lamp behind the target light
 # Camera rays along each axis of a pixel where lights are exact: everywhere; where the picture changes by a tenth to
 # the next pixel; by half, as at the edge of a shadow. Highlights get their own (`render/camera/highlight_cells.py`).
 GRID_PLAIN, GRID_DETAIL, GRID_EDGE = 2, 6, 12
+DETAIL, EDGE = 0.1, 0.5  # changes to the next pixel, of the logarithm
 FINER = 2  # rays along each axis at the solution, relative to those a start is found with
 FINEST = 60
 MOST_FINE_RAYS = 500_000  # above, pixels are small enough for the first recording
@@ -30,6 +31,8 @@ MOST_FINE_RAYS = 500_000  # above, pixels are small enough for the first recordi
 # counts as lit, of the median of the target
 MOST_THINNED, MOST_BRIGHT, LIT = 0.6, 100, 0.01
 SMALL_TARGET = 16  # a target this small may lie between the rays of a coarser grid
+LEAST_GROUPS = 64  # of an even spread: enough for twenty unknowns
+BRIGHT_PART = 3  # the brightest have no more than one lane of so many
 FIREFLY = 10.0  # times the brightest of the eight neighbours; a highlight that a pixel resolves falls off slower
 _AROUND = [(dy, dx) for dy in (-1, 0, 1) for dx in (-1, 0, 1) if (dy, dx) != (0, 0)]
 
@@ -59,10 +62,10 @@ def fewer_groups(groups: LaneGroups, reference: Pixels, lanes: int) -> LaneGroup
     if size.sum() <= lanes:
         return groups
     bright = np.argsort(luminance(groups.average(reference)))[::-1]
-    bright = bright[np.cumsum(size[bright]) <= lanes // 3]
+    bright = bright[np.cumsum(size[bright]) <= lanes // BRIGHT_PART]
     rest = np.setdiff1d(np.arange(len(groups)), bright)
-    # what is left of the budget goes to an even spread; 64 groups are the least that can hold twenty unknowns
-    count = max(int(len(rest) * (lanes - size[bright].sum()) / max(size[rest].sum(), 1)), 64)
+    # what is left of the budget goes to an even spread
+    count = max(int(len(rest) * (lanes - size[bright].sum()) / max(size[rest].sum(), 1)), LEAST_GROUPS)
     spread = rest[np.linspace(0, len(rest) - 1, min(count, len(rest))).astype(int)]
     return groups.take(np.union1d(spread, bright))
 
@@ -98,8 +101,8 @@ def detail_grid(
             inside &= np.roll(mask, shift, axis)
             change = np.maximum(change, np.abs(level - np.roll(level, shift, axis)))
     grid = np.full(level.shape, GRID_PLAIN)
-    grid[mask & (change > 0.1)] = GRID_DETAIL
-    grid[inside & (change > 0.5)] = GRID_EDGE
+    grid[mask & (change > DETAIL)] = GRID_DETAIL
+    grid[inside & (change > EDGE)] = GRID_EDGE
     if edges is not None:
         grid[edges] = GRID_EDGE
     if mask.sum() <= SMALL_TARGET:

@@ -28,6 +28,8 @@ ROUGHER_WIDTH = 0.6
 # Of the residuals, for one node. With 2 and 8 the first 14 scenes of `base` end at the same FLIP, for 0.95 and 1.04 of
 # the passes; those of `noise` with 2, for 0.98
 NODE_EVALUATIONS = 4
+NODES_APART = 0.2  # of the logarithm of a value: nodes nearer to each other are one start. No measurement
+WALLS = 0.1  # of the range: no random start is nearer to an end of it. No measurement
 
 
 @dataclass(frozen=True)
@@ -100,7 +102,7 @@ def agreeing_ends(
 
 def random_start(table: ParameterTable, seed: int) -> Vector:
     """A start anywhere in the box but near its walls."""
-    return table.lower + table.width * np.random.default_rng(seed).uniform(0.1, 0.9, table.length)
+    return table.lower + table.width * np.random.default_rng(seed).uniform(WALLS, 1.0 - WALLS, table.length)
 
 
 def best_starts(nodes: Sequence[ScanNode], count: int) -> list[Vector]:
@@ -122,4 +124,4 @@ def different_nodes(nodes: Sequence[ScanNode], count: int) -> list[ScanNode]:
 
 
 def _apart(a: ScanNode, b: ScanNode) -> bool:
-    return a.metal != b.metal or any(abs(np.log(p / q)) > 0.2 for p, q in zip(a.held, b.held, strict=True))
+    return a.metal != b.metal or any(abs(np.log(p / q)) > NODES_APART for p, q in zip(a.held, b.held, strict=True))

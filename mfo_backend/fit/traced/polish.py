@@ -18,11 +18,12 @@ from .pictures import GEOMETRIC, SECANT_BELOW, TracedTiles, two_half_equations
 from .polished import AMOUNTS, Polished, without_lobe
 from .sample_count import MOST_COUNT
 from .sample_pools import TilePools
-from .search import Setting, Vector
+from .search import SCAN_DAMPING, TRUST, Setting, Vector
 from .tile_rows import LARGEST_TILE
 
 COAT_NODES = (0.1, 0.3, 0.6)  # roughness, besides the scene's
 COAT = 0.3  # weight they start from
+POLISH_DAMPING, POLISH_TRUST = 1e-3, 0.1  # of the curvature, added to it; of the range: the longest step
 SURELY_OFF = 0.05  # of the range: standard deviation of an amount that can be told from none
 TILE_SIZES = (1, 2, 4, LARGEST_TILE)
 SETTLED = 2  # times in a row that the expected error has to be small: it is an estimate itself
@@ -98,7 +99,7 @@ def _coated(setting: Setting, x: Vector) -> Vector:
             return x
         equations = [two_half_equations(*pair) for pair in rows]
         best = xs[int(np.argmin([e.cost for e in equations]))]
-        xs = np.array([y + setting.step(e, y, 0.02, 0.25, frozen) for e, y in zip(equations, xs, strict=True)])
+        xs = np.array([y + setting.step(e, y, SCAN_DAMPING, TRUST, frozen) for e, y in zip(equations, xs, strict=True)])
     return best
 
 
@@ -165,7 +166,7 @@ def _pool(
         pools.add(np.split(rows, 2), samples)
         equations, noise, size = pools.best(width)
         setting.note(stage, x, equations.cost)
-        step = setting.step(equations, x, 1e-3, 0.1, frozen, noise)
+        step = setting.step(equations, x, POLISH_DAMPING, POLISH_TRUST, frozen, noise)
         moved = _moved(setting, step)
         x = x + step
         pools.shifted(step)

@@ -24,6 +24,10 @@ from .polished import CORE
 TRACED_ROUGHNESS_NODES = (0.05, 0.12, 0.22, 0.35, 0.55, 0.85)
 IOR_NODES = (1.1, 1.25, 1.4, 1.55, 1.75, 2.1)
 TRUST = 0.25  # of the range: the longest step
+SCAN_DAMPING, SCAN_TRUST = 0.02, 0.5  # of the curvature added to it; the longest step of a node. No measurement
+MIDDLE = 0.75  # of the range: colour and transmission that a node starts with, for most glass is clear. No measurement
+GAINED = 0.8  # of the cost before: a turn of a race that leaves more has gained nothing. No measurement
+BEHIND = 2.0  # times the leader's cost above it: a runner there is given up. No measurement
 RIVALS = 3  # other ends of a race
 
 
@@ -80,7 +84,7 @@ def scan(setting: Setting) -> list[Vector]:
         for name in ("base_color", "transmission_weight"):
             if name in table.names:
                 part = table.slice_of(name)
-                middle[part] = table.lower[part] + 0.75 * setting.table.width[part]
+                middle[part] = table.lower[part] + MIDDLE * setting.table.width[part]
         xs = []
         for values in product(*(nodes[name] for name in held)):
             x = middle.copy()
@@ -101,7 +105,7 @@ def scan(setting: Setting) -> list[Vector]:
                 break
             # the better half goes on
             order = order[: -(-len(order) // 2)]
-            xs = np.array([xs[i] + setting.step(equations[i], xs[i], 0.02, 0.5, frozen) for i in order])
+            xs = np.array([xs[i] + setting.step(equations[i], xs[i], SCAN_DAMPING, SCAN_TRUST, frozen) for i in order])
         stage.vector = xs[order[0]]
         return [xs[i] for i in order]
 
@@ -163,7 +167,7 @@ def race(setting: Setting, nodes: Sequence[Vector]) -> list[Vector]:
             best = runners[0]
             stage.vector = best.x
             setting.note(stage, best.x, best.cost)
-            gained = best.cost < 0.8 * cost
+            gained = best.cost < GAINED * cost
             cost = best.cost
             if turn >= 2:
                 if not gained:
@@ -176,6 +180,6 @@ def _leaders(setting: Setting, runners: Sequence[Runner]) -> list[Runner]:
     """Those of the sorted runners that have not fallen behind and are not where a better one is."""
     leader, kept = runners[0].cost, list[Runner]()
     for runner in runners:
-        if runner.cost <= leader + 2.0 * abs(leader) and is_new(runner.x, [each.x for each in kept], setting.table):
+        if runner.cost <= leader + BEHIND * abs(leader) and is_new(runner.x, [each.x for each in kept], setting.table):
             kept.append(runner)
     return kept[:2]
