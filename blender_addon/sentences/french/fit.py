@@ -82,6 +82,7 @@ FIT = {
     "{} has no verdict ({})": "{} est sans verdict ({})",
     "{} have no verdict ({})": "{} sont sans verdict ({})",
     "The light between the materials still moved after {} rounds: fit again from the applied values, or fit fewer at once.": "La lumière entre les matériaux bougeait encore après {} tours : réajuster à partir des valeurs appliquées, ou en ajuster moins à la fois.",
+    "Towards one side the picture hardly changes with {}: what is further there looks the same.": "D'un côté l'image ne change guère avec {} : ce qui se trouve plus loin se ressemble.",
     "The fit was stopped before it came to this material.": "L'ajustement a été arrêté avant d'en venir à ce matériau.",
     "A fit of this material failed ({}): what was found before it stays; the log holds the details.": "Un ajustement de ce matériau a échoué ({}) : ce qui avait été trouvé avant reste ; le journal contient les détails.",
     "The {} materials have {} free values, and at most {} are fitted together: leave out {}, or choose fewer parameters, or a queue.": "Les {} matériaux ont {} valeurs libres, et {} au plus sont ajustées ensemble : laisser {} de côté, choisir moins de paramètres ou une file.",

@@ -82,6 +82,7 @@ FIT = {
     "{} has no verdict ({})": "{} ist ohne Urteil ({})",
     "{} have no verdict ({})": "{} sind ohne Urteil ({})",
     "The light between the materials still moved after {} rounds: fit again from the applied values, or fit fewer at once.": "Das Licht zwischen den Materialien änderte sich nach {} Runden noch: noch einmal von den angewendeten Werten anpassen, oder weniger zugleich.",
+    "Towards one side the picture hardly changes with {}: what is further there looks the same.": "Zu einer Seite hin ändert sich das Bild kaum mit {}: was weiter dort liegt, sieht gleich aus.",
     "The fit was stopped before it came to this material.": "Die Anpassung wurde angehalten, bevor sie zu diesem Material kam.",
     "A fit of this material failed ({}): what was found before it stays; the log holds the details.": "Eine Anpassung dieses Materials ist gescheitert ({}): was davor gefunden war, bleibt; Näheres steht im Protokoll.",
     "The {} materials have {} free values, and at most {} are fitted together: leave out {}, or choose fewer parameters, or a queue.": "Die {} Materialien haben {} freie Werte, und höchstens {} werden zusammen angepasst: {} weglassen, weniger Werte auswählen oder eine Warteschlange.",

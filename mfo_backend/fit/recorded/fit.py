@@ -35,6 +35,7 @@ from ..squares.stage_residuals import finishing_residuals
 from ..tolerances import AT_NOISE, NOISY, VISIBLE
 from .keep_user_values import Judged, Kept, keep_values
 from .perceptual_stages import perceptual_ends
+from .plateaus import with_plateaus
 from .recording import Setting, Vector
 from .refine import OnRecording, refine_exact, refine_sampled
 from .start import Started, start_from_nothing
@@ -130,6 +131,7 @@ class RecordedRoute:
         end = replace(end, refined=end.refined.near(setting.table, setting.user))
         del started  # and with it the first recording
         kept = keep_values(end, None if setting.sampled else task.judge(task.light, blurred=False).value)
+        kept = with_plateaus(end, kept)
         disagree = self._contradiction(end, kept)
         later, notes, counts = self._perceptual(end, kept, others)
         notes = [*scene.needs.notes, *notes]

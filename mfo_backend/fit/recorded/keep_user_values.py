@@ -21,7 +21,7 @@ from ..certainty.covariance import certainties, covariance, standard_deviations,
 from ..result.outcome import kept_note
 from ..squares.problem import Problem, Refined
 from ..squares.recording_noise import rows_of_samples
-from ..squares.residuals import RelativeResidual
+from ..squares.residuals import RelativeResidual, Residual
 from ..tolerances import AS_GOOD, MODEL_ERROR, NOT_AS_GOOD, SIGNIFICANT, UNSEEN_CHANGE, VISIBLE
 from .recording import Recording, Setting, Vector
 from .refine import OnRecording
@@ -127,11 +127,15 @@ class Judged:
         """Residuals and derivatives (g, 3, 1 + k) that certainty is taken from, and the recording's noise in them."""
         return self._rows_of(self._problem.evaluate, x)
 
+    @property
+    def residual(self) -> Residual:
+        """What certainty is taken from: deviations of the noise, or relative differences."""
+        if self._setting.sampled:
+            return self._problem.residual
+        return RelativeResidual(self._problem.groups.average(self._setting.reference))
+
     def _rows_of(self, evaluate: RecordedImage, x: Vector) -> tuple[NDArray[np.float64], NDArray[np.float64] | None]:
-        residual = self._problem.residual
-        if not self._setting.sampled:
-            residual = RelativeResidual(self._problem.groups.average(self._setting.reference))
-        return rows_of_samples(evaluate.samples(x), residual)
+        return rows_of_samples(evaluate.samples(x), self.residual)
 
 
 class _UnseenChange:

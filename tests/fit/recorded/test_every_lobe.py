@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
-"""A fit of each lobe of Blender's model runs to its end, by all the kernels that it makes, and finds the picture."""
+"""Fits of each lobe of Blender's model, and of a material with holes, run to their end by all the kernels that they make,
+and find the picture."""
 
 from __future__ import annotations
 
@@ -10,9 +11,11 @@ from mfo_backend.fit.recover_material import recover_material
 from mfo_backend.fit.settings import FitSettings
 from mfo_backend.material.principled.principled_parameters import parameter_to_socket
 from mfo_backend.render.pictures.renderer import load_renderer
+from mfo_backend.scene.exr_file import write_exr
 from mfo_backend.types.image import Encoding, Image
 from mfo_backend.types.light_paths import LightPaths
 from mfo_backend.types.status import Status
+from tests.fit.traced import glass
 from tests.material.materials import MATERIALS
 from tests.render.scenes import POINT, SKY, write_scene
 
@@ -78,3 +81,21 @@ def test_a_fit_of_each_shader_alone_ends_at_its_picture(tmp_path, name, shape):
     assert error < 0.2
     traced = any("whole light paths were traced" in note for note in notes)
     assert traced == (name in ("glass", "refraction", "translucent"))  # what light passes
+
+
+SEEN = {"base_color": (0.7, 0.4, 0.2), "roughness": 0.4, "metallic": 0.7}
+
+
+@pytest.mark.parametrize("even", [False, True])
+def test_values_of_a_material_with_holes_are_recovered(even, tmp_path):
+    """A texture's holes, and an even alpha, which leaves no pixel without background."""
+    alpha = {"value": 0.6, "linked": not even}
+    if not even:
+        cells = np.random.default_rng(4).choice([0.0, 1.0], (4, 8, 1))
+        write_exr(tmp_path / "alpha.exr", np.repeat(cells, 3, axis=2).astype(np.float32))
+        alpha["texture"] = str(tmp_path / "alpha.exr")
+    renderer = glass.load(tmp_path, list(SEEN), {"Alpha": alpha}, size=40)
+    x = renderer.table.pack(SEEN)
+    result, _ = glass.fit(renderer, renderer.image(x, seed=5, spp=64))
+    assert [stage.name for stage in result.stages] == ["scan", "start", "refine"]
+    np.testing.assert_allclose(renderer.table.pack(result.recovered), x, atol=0.1)  # at 64 samples a pixel
