@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Fits of each lobe of Blender's model, and of a material with holes, run to their end by all the kernels that they make,
-and find the picture."""
+"""Fits of each lobe of Blender's model, and of a material with holes, run to their end by all their kernels, and find
+the picture."""
 
 from __future__ import annotations
 
