@@ -60,6 +60,7 @@ FIT = {
     "The picture is as noisy as one of {} samples a pixel: compressed pixels of as many samples were compared, so that no firefly decides.": "L'image est aussi bruitée qu'une de {} échantillons par pixel : des pixels compressés d'autant d'échantillons ont été comparés, pour qu'aucune luciole ne décide.",
     "Reference has {} pixels with negative values; they were set to 0.": "La référence a {} pixels aux valeurs négatives ; ils ont été mis à 0.",
     # other kinds of material
+    "A plainer material looks the same as one with further layers, so it is the result.": "Un matériau plus simple ressemble à celui qui a d'autres couches, il est donc le résultat.",
     "A plainer material that glows looks the same as one of many layers, so it is the result.": "Un matériau plus simple, qui luit, a la même apparence qu'un matériau à plusieurs couches, donc c'est le résultat.",
     "The material of the scene did not match, so the fit began again from one that is {}.": "Le matériau de la scène ne correspondait pas, donc l'ajustement a recommencé à partir d'un autre : {}.",
     "The material of the scene did not match.": "Le matériau de la scène ne correspondait pas.",

@@ -60,6 +60,7 @@ FIT = {
     "The picture is as noisy as one of {} samples a pixel: compressed pixels of as many samples were compared, so that no firefly decides.": "Das Bild rauscht wie eines mit {} Samples je Pixel: verglichen wurden gestauchte Pixel mit ebenso vielen Samples, damit kein Firefly entscheidet.",
     "Reference has {} pixels with negative values; they were set to 0.": "Die Referenz hat {} Pixel mit negativen Werten; sie wurden auf 0 gesetzt.",
     # other kinds of material
+    "A plainer material looks the same as one with further layers, so it is the result.": "Ein schlichteres Material sieht aus wie eines mit weiteren Schichten, also ist es das Ergebnis.",
     "A plainer material that glows looks the same as one of many layers, so it is the result.": "Ein schlichteres Material, das leuchtet, sieht aus wie eines mit vielen Schichten, also ist es das Ergebnis.",
     "The material of the scene did not match, so the fit began again from one that is {}.": "Das Material der Szene passte nicht, also begann die Anpassung noch einmal von einem, das so ist: {}.",
     "The material of the scene did not match.": "Das Material der Szene passte nicht.",

@@ -19,6 +19,7 @@ from ...types.result import FitResult
 from ...types.status import Status
 from ...types.verdict import Verdict
 from .material_classes import (
+    PLAINER,
     PLAINER_GLOW,
     MaterialClass,
     doubted,
@@ -122,6 +123,28 @@ def with_plainer_glow(
     seconds, passes = before.seconds + after.seconds, before.passes + after.passes
     before = doubted(before, after, material) if alike else before
     return replace(fitted, result=replace(before, seconds=seconds, passes=passes))
+
+
+def with_plainer(fitted: Fitted, material: Mapping[str, Any], fit_plain: Callable[[], Fitted]) -> Fitted:
+    """A result, or a plainer one that looks the same, as unsure as the two are apart."""
+    try:
+        again = fit_plain()
+    except UnrecordableError:
+        return fitted
+    except Exception:
+        traceback.print_exc(file=sys.stderr)
+        return fitted
+    before, after = fitted.result, again.result
+    judged, first = after.judgement, before.judgement
+    if judged is None or first is None or judged.verdict is not Verdict.SAME or not look_alike(first, judged):
+        return replace(fitted, result=_with_cost(before, after.seconds, after.passes))
+    result = replace(
+        doubted(after, before, material),
+        notes=(*after.notes, PLAINER),
+        seconds=before.seconds + after.seconds,
+        passes=before.passes + after.passes,
+    )
+    return replace(again, result=result, start_image=fitted.start_image)
 
 
 def _taken(first: Fitted, again: Fitted, other: MaterialClass, material: Mapping[str, Any], note: str) -> Fitted:

@@ -19,7 +19,7 @@ from ...types.parameter_bounds import narrowed
 from ...types.result import FitResult
 from ..folder.job_folder import JobFolder
 from ..folder.request import Request
-from .class_trials import Fitted, with_other_classes, with_plainer_glow
+from .class_trials import Fitted, with_other_classes, with_plainer, with_plainer_glow
 from .fit_materials import fit_materials
 from .graph_blender import HELD, evaluated_graphs, refusal_of
 from .job_outcome import JobOutcome
@@ -30,8 +30,10 @@ from .material_classes import (
     changed,
     is_rich,
     is_worth_another,
+    new_layers,
     other_classes,
     parameters_of,
+    without_layers,
 )
 from .more_pictures import JobPicture, told_of_first
 
@@ -240,6 +242,7 @@ def _fit_and_other_classes(job: _OneMaterial) -> tuple[Fitted, tuple[str, ...]]:
         notes = (HELD.format(why=refused),)
         renderers = job.load(request.fit.parameters, ())
     fitted, names = job.fit(renderers), renderers[0].table.names
+    own = fitted.result.recovered
     del renderers  # their scenes are large
     if job.start is None:
         return fitted, notes
@@ -264,6 +267,10 @@ def _fit_and_other_classes(job: _OneMaterial) -> tuple[Fitted, tuple[str, ...]]:
     if is_rich(fitted.result, request.fit.parameters) and not job.should_stop():
         any_distance = partial(fit_from, nearer_than=np.inf)  # what is plainer need not be nearer
         fitted = with_plainer_glow(fitted, job.start, classes, any_distance)
+    layers = new_layers(fitted.result, request.fit.parameters)
+    if layers and fitted.result.recovered is own and not job.should_stop():
+        plain = without_layers(names, layers)
+        fitted = with_plainer(fitted, job.start, lambda: job.fit(job.load(plain, ()), nearer_than=np.inf))
     return fitted, notes
 
 

@@ -15,6 +15,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ...material.principled.blender_selection import AMOUNT_OF
 from ...material.principled.principled_dict import socket_value
 from ...material.principled.principled_parameters import BLENDER_PRINCIPLED, PARAMETER_OF_SOCKET, SOCKET_OF_PARAMETER
 from ...metrics.display.tone_mapping import View
@@ -37,6 +38,8 @@ _AROUND = (Cause.LIGHT, Cause.SURROUNDINGS, Cause.PICTURE)  # where the surround
 # a metal with a coat and a sheen
 LAYERS, LAYER = ("metallic", "specular_tint", "coat_weight", "sheen_weight"), 0.05
 MANY_LAYERS = 3
+POLISH = "polish"  # a stage that only fits on whole light paths have
+PLAINER = "A plainer material looks the same as one with further layers, so it is the result."
 PLAINER_GLOW = "A plainer material that glows looks the same as one of many layers, so it is the result."
 CLEARLY_BETTER = 0.5  # times the difference of the first result, and less than that by so much FLIP
 LEAST_GAIN = 0.01
@@ -216,6 +219,24 @@ def is_rich(result: FitResult, selection: str | Sequence[str]) -> bool:
     return judgement.verdict is Verdict.SAME and _layers(result.recovered, result.initial) >= MANY_LAYERS
 
 
+def new_layers(result: FitResult, selection: str | Sequence[str]) -> list[str]:
+    """The layers of a result from whole light paths that looks the same, which the scene's material lacks.
+
+    There no other solution is looked for that explains the picture as well; recorded light has the plainest of them.
+    """
+    judgement, values = result.judgement, result.recovered
+    if judgement is None or selection != "all" or judgement.verdict is not Verdict.SAME:
+        return []
+    if result.model != "blender_principled" or not any(stage.name == POLISH for stage in result.stages):
+        return []
+    return [name for name in LAYERS if _has(name, values) and not _has(name, result.initial)]
+
+
+def without_layers(names: Sequence[str], layers: Sequence[str]) -> list[str]:
+    """What is left of the values without these layers and their details."""
+    return [name for name in names if name not in layers and AMOUNT_OF.get(name) not in layers]
+
+
 def is_plainer(glowing: FitResult, than: FitResult, material: Mapping[str, Any]) -> bool:
     """Whether a result has fewer layers that the scene's material lacks, its glow being one."""
     own = {name: value_of(material, name) for name in LAYERS}
@@ -224,12 +245,12 @@ def is_plainer(glowing: FitResult, than: FitResult, material: Mapping[str, Any])
 
 def _layers(values: Mapping[str, Value], own: Mapping[str, Value]) -> int:
     """How many of the layers `values` have and a material of its `own` lacks; of a tint what is not white."""
-    plain = {name: 1.0 if name.endswith("_tint") else 0.0 for name in LAYERS}
+    return sum(_has(name, values) and not _has(name, own) for name in LAYERS)
 
-    def is_there(name: str, of: Mapping[str, Value]) -> bool:
-        return bool(np.max(np.abs(np.subtract(of.get(name, plain[name]), plain[name]))) > LAYER)
 
-    return sum(is_there(name, values) and not is_there(name, own) for name in LAYERS)
+def _has(layer: str, values: Mapping[str, Value]) -> bool:
+    plain = 1.0 if layer.endswith("_tint") else 0.0
+    return bool(np.max(np.abs(np.subtract(values.get(layer, plain), plain))) > LAYER)
 
 
 def is_better(judgement: Judgement | None, than: Judgement, other: MaterialClass) -> bool:

@@ -13,23 +13,27 @@ from mfo_backend.job.run import class_trials as module
 from mfo_backend.job.run import fit_scene
 from mfo_backend.job.run.material_classes import (
     MOST_GLOW,
+    PLAINER,
     PLAINER_GLOW,
+    POLISH,
     brightest_glow,
     changed,
     is_better,
     is_rich,
     is_worth_another,
+    new_layers,
     other_classes,
     parameters_of,
     value_of,
     with_values_of,
+    without_layers,
 )
 from mfo_backend.metrics.display.tone_mapping import DisplayView
 from mfo_backend.render.sheet.contact_sheet import ContactSheet
 from mfo_backend.types.certainty import Certainty, Level
 from mfo_backend.types.errors import NoNearerError, UnrecordableError
 from mfo_backend.types.image import Encoding, Image
-from mfo_backend.types.result import Contradiction, FitResult
+from mfo_backend.types.result import Contradiction, FitResult, StageReport
 from mfo_backend.types.status import Status
 from mfo_backend.types.verdict import Cause, Difference, Judgement, Verdict
 
@@ -187,6 +191,46 @@ def test_a_plain_glow_takes_the_place_of_many_layers():
         raise np.linalg.LinAlgError("Singular matrix")
 
     assert module.with_plainer_glow(rich, material(), classes, fails) is rich
+
+
+def of_whole_paths(visible, verdict, **values):
+    """A result of such a fit, from a plain material."""
+    found = fitted(visible, verdict, Status.CONVERGED)
+    plain = {"metallic": 0.0, "coat_weight": 0.0, "coat_roughness": 0.03, "specular_ior_level": 0.5}
+    stages = (StageReport(POLISH, Status.CONVERGED, 0.1, 0.0, 3, 1.0, {}),)
+    sure = {name: Certainty((0.001,), Level.DETERMINED) for name in plain}
+    values = plain | values
+    return replace(found, result=replace(found.result, initial=plain, recovered=values, stages=stages, certainty=sure))
+
+
+def test_new_layers_are_those_of_whole_light_paths_that_look_the_same():
+    rich = of_whole_paths(0.001, Verdict.SAME, coat_weight=0.5, metallic=0.04).result
+    assert new_layers(rich, "all") == ["coat_weight"]
+    assert without_layers(rich.recovered, ["coat_weight"]) == ["metallic", "specular_ior_level"]
+    assert new_layers(rich, ["coat_weight"]) == []  # which was asked for
+    assert new_layers(replace(rich, stages=()), "all") == []
+    assert new_layers(replace(rich, initial=rich.recovered), "all") == []
+    assert new_layers(of_whole_paths(0.2, Verdict.DIFFERENT, coat_weight=0.5).result, "all") == []
+
+
+def test_a_plainer_material_that_looks_the_same_is_the_result():
+    rich = of_whole_paths(0.001, Verdict.SAME, coat_weight=0.5, specular_ior_level=0.2)
+    plain = of_whole_paths(0.002, Verdict.SAME, specular_ior_level=0.5)
+    found = module.with_plainer(rich, material(), lambda: plain).result
+    assert found.recovered == plain.result.recovered
+    assert (found.notes, found.seconds) == ((PLAINER,), 2.0)
+    # as unsure as the two are apart
+    assert found.certainty["specular_ior_level"].level is not Level.DETERMINED
+    assert found.certainty["metallic"].level is Level.DETERMINED
+    for other in (of_whole_paths(0.02, Verdict.SAME), of_whole_paths(0.2, Verdict.DIFFERENT)):
+        kept = module.with_plainer(rich, material(), lambda other=other: other).result
+        assert (kept.recovered, kept.certainty) == (rich.result.recovered, rich.result.certainty)
+        assert kept.seconds == 2.0
+
+    def fails():
+        raise MemoryError
+
+    assert module.with_plainer(rich, material(), fails) is rich
 
 
 def test_what_a_class_has_held_is_part_of_its_result():
