@@ -24,6 +24,19 @@ for stop in stops:
     stop.color = (0.4, 0.4, 0.4, 1.0)
 bpy.ops.wm.save_as_mainfile(filepath=argv[0])
 """
+HOLES = """
+tree = target.active_material.node_tree
+checker = tree.nodes.new("ShaderNodeTexChecker")
+checker.inputs["Scale"].default_value = 6.0
+shader, output = tree.nodes["Principled BSDF"], tree.get_output_node("CYCLES")
+if argv[2] == "alpha":
+    tree.links.new(checker.outputs["Fac"], shader.inputs["Alpha"])
+else:
+    mix, clear = tree.nodes.new("ShaderNodeMixShader"), tree.nodes.new("ShaderNodeBsdfTransparent")
+    for socket, place in ((checker.outputs["Fac"], 0), (clear.outputs[0], 1), (shader.outputs[0], 2)):
+        tree.links.new(socket, mix.inputs[place])
+    tree.links.new(mix.outputs[0], output.inputs["Surface"])
+"""
 SHOW = """
 bpy.ops.wm.open_mainfile(filepath=argv[0])
 stops = bpy.data.objects["Suzanne"].active_material.node_tree.nodes["Color Ramp"].color_ramp.elements
@@ -85,6 +98,21 @@ def test_stops_of_a_ramp_are_found_and_applied(ramp: Ramp, tmp_path: Path) -> No
     low, high = run_bpy(SHOW, saved)
     assert low == pytest.approx([0.8, 0.1, 0.05, 1.0], abs=0.02)
     assert high == pytest.approx([0.05, 0.2, 0.7, 1.0], abs=0.02)
+
+
+@pytest.mark.parametrize("by", ["alpha", "transparent"])
+def test_stops_of_what_has_holes_are_found_and_applied(by: str, tmp_path: Path) -> None:
+    """Half of a head is cut out, so that its inside is seen."""
+    start, picture, saved = tmp_path / "start.blend", tmp_path / "front.exr", tmp_path / "saved.blend"
+    run_bpy(BUILD.replace("stops =", f"{HOLES}stops =", 1), start, picture, by)
+    done = run_mfo(
+        "blend", start, "--object", "Suzanne", "--reference", picture, "--parameters", "Color Ramp/Stop 0, Color "
+        "Ramp/Stop 1", "--preset", "fast", "--out", tmp_path / "job", "--apply", "--save-as", saved, "--json",
+    )  # fmt: skip
+    assert done.code == 0, done.stderr
+    low, high = run_bpy(SHOW, saved)
+    assert low == pytest.approx([0.8, 0.1, 0.05, 1.0], abs=0.05)
+    assert high == pytest.approx([0.05, 0.2, 0.7, 1.0], abs=0.05)
 
 
 def test_two_pictures_of_values_inside_nodes(ramp: Ramp, tmp_path: Path) -> None:
