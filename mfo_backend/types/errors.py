@@ -24,6 +24,11 @@ class SetupError(MfoError):
     status = Status.SETUP
 
 
+def first_line(error: Exception) -> str:
+    """What an error says that is not meant for the user, without further lines: at most 200 letters."""
+    return str(error).strip().split("\n")[0][:200]
+
+
 class NoNearerError(Exception):  # of a trial, which no user meets
     """A fit from another class of material stopped early: it would not come nearer than the result that there is."""
 

@@ -16,7 +16,7 @@ from ...render.pictures.mitsuba_renderer import MitsubaRenderer
 from ...render.pictures.renderer import Interrupted
 from ...render.sheet.recorded_sheet import RecordedSheet
 from ...render.sheet.sheet_renderer import SheetRenderer
-from ...types.errors import BadInputError, MfoError, UnrecordableError
+from ...types.errors import BadInputError, MfoError, UnrecordableError, first_line
 from ...types.image import Image, Pixels
 from ...types.status import Status
 from ..judge.checked_reference import check_reference
@@ -173,7 +173,7 @@ def take_turns(members: Sequence[Member], tasks: Sequence[FitTask], recorded: Se
         raise next(iter(failed.values()), Interrupted())
     ended = [outcome or _as_it_was(member) for outcome, member in zip(outcomes, members, strict=True)]
     for k, error in failed.items():
-        ended[k] = _failed(ended[k], error)
+        ended[k] = _without_certainty(outcomes[k] or _as_it_was(members[k], Status.DIFFERENT), error)
     values = [x if outcome else m.renderer.start for x, outcome, m in zip(present, outcomes, members, strict=True)]
     return Turns(tuple(ended), tuple(values), number, still)
 
@@ -188,20 +188,19 @@ def _share_needs(recorded: Sequence[Recorded], at: int) -> None:
             other.needs = one.needs
 
 
-def _as_it_was(member: Member) -> FitOutcome:
-    """The outcome of a material whose turn did not come."""
+def _as_it_was(member: Member, status: Status = Status.CANCELLED) -> FitOutcome:
+    """The outcome of a material of which no fit has ended: its turn did not come, or it failed."""
     renderer, mask = member.renderer, member.renderer.target_mask()
-    result = result_at(renderer, renderer.start, Status.CANCELLED, Status.CANCELLED.sentence, 0.0)
+    result = result_at(renderer, renderer.start, status, status.sentence, 0.0)
     nothing = np.zeros((*mask.shape, 3), np.float32)
-    return FitOutcome(replace(result, notes=(NOT_YET,)), nothing, nothing, mask)
+    notes = (NOT_YET,) if status is Status.CANCELLED else ()
+    return FitOutcome(replace(result, notes=notes), nothing, nothing, mask)
 
 
-def _failed(before: FitOutcome, error: Exception) -> FitOutcome:
+def _without_certainty(before: FitOutcome, error: Exception) -> FitOutcome:
     """The outcome before a fit that failed, with a note; no value is sure in it."""
-    what = f"{type(error).__name__}: {error}".strip().split("\n")[0][:200]
-    notes = (*(note for note in before.result.notes if note != NOT_YET), FAILED.format(what=what))
-    result = replace(before.result, status=Status.FAILED, message=Status.FAILED.sentence, notes=notes, certainty={})
-    return replace(before, result=result)
+    notes = (*before.result.notes, FAILED.format(what=f"{type(error).__name__}: {first_line(error)}"))
+    return replace(before, result=replace(before.result, notes=notes, certainty={}, weak_combinations=()))
 
 
 def show_all(members: Sequence[Member], vectors: Sequence[NDArray[np.float64]]) -> None:

@@ -36,7 +36,7 @@ def with_plateaus(end: OnRecording, kept: Kept) -> Kept:
         for name in names
         for entry in range(*table.slice_of(name).indices(table.length))
         for moved in (_beside(x, entry, side * BESIDE * table.width[entry], table) for side in (-1.0, 1.0))
-        if abs(moved[entry] - x[entry]) >= 0.5 * BESIDE * table.width[entry]  # else it is at an end of its range
+        if abs(moved[entry] - x[entry]) > DETERMINED_BELOW * table.width[entry]  # else it is at an end of its range
     ]
     if not sides:
         return kept

@@ -23,7 +23,7 @@ MINIMUM_LIT_SHARE = 0.1  # of the recorded lanes: a lamp behind the target light
 # Camera rays along each axis of a pixel where lights are exact: everywhere; where the picture changes by a tenth to
 # the next pixel; by half, as at the edge of a shadow. Highlights get their own (`render/camera/highlight_cells.py`).
 GRID_PLAIN, GRID_DETAIL, GRID_EDGE = 2, 6, 12
-DETAIL, EDGE = 0.1, 0.5  # changes to the next pixel, of the logarithm
+DETAIL, EDGE = 0.1, 0.5  # changes to the next pixel, of the logarithm. No measurement
 FINER = 2  # rays along each axis at the solution, relative to those a start is found with
 FINEST = 60
 MOST_FINE_RAYS = 500_000  # above, pixels are small enough for the first recording
@@ -31,8 +31,8 @@ MOST_FINE_RAYS = 500_000  # above, pixels are small enough for the first recordi
 # counts as lit, of the median of the target
 MOST_THINNED, MOST_BRIGHT, LIT = 0.6, 100, 0.01
 SMALL_TARGET = 16  # a target this small may lie between the rays of a coarser grid
-LEAST_GROUPS = 64  # of an even spread: enough for twenty unknowns
-BRIGHT_PART = 3  # the brightest have no more than one lane of so many
+LEAST_GROUPS = 64  # of an even spread: the least that can hold twenty unknowns. No measurement
+BRIGHT_PART = 3  # the brightest groups have no more than one lane of so many. No measurement
 FIREFLY = 10.0  # times the brightest of the eight neighbours; a highlight that a pixel resolves falls off slower
 _AROUND = [(dy, dx) for dy in (-1, 0, 1) for dx in (-1, 0, 1) if (dy, dx) != (0, 0)]
 

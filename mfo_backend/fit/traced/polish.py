@@ -23,7 +23,8 @@ from .tile_rows import LARGEST_TILE
 
 COAT_NODES = (0.1, 0.3, 0.6)  # roughness, besides the scene's
 COAT = 0.3  # weight they start from
-POLISH_DAMPING, POLISH_TRUST = 1e-3, 0.1  # of the curvature, added to it; of the range: the longest step
+# Of the curvature, added to it; of the range, the longest step. No measurement
+POLISH_DAMPING, POLISH_TRUST = 1e-3, 0.1
 SURELY_OFF = 0.05  # of the range: standard deviation of an amount that can be told from none
 TILE_SIZES = (1, 2, 4, LARGEST_TILE)
 SETTLED = 2  # times in a row that the expected error has to be small: it is an estimate itself
@@ -187,7 +188,7 @@ def _pool(
     if pools.are_many and not stopped():
         # cautious steps end up to a deviation short of what all samples together say
         equations, _, size = pools.best(width)
-        x = x + setting.step(equations, x, 1e-3, 0.1, frozen)
+        x = x + setting.step(equations, x, POLISH_DAMPING, POLISH_TRUST, frozen)
         stage.vector = x
     covariance, noise = pools.covariance(equations, size, width)
     again = None

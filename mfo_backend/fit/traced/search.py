@@ -24,7 +24,7 @@ from .polished import CORE
 TRACED_ROUGHNESS_NODES = (0.05, 0.12, 0.22, 0.35, 0.55, 0.85)
 IOR_NODES = (1.1, 1.25, 1.4, 1.55, 1.75, 2.1)
 TRUST = 0.25  # of the range: the longest step
-SCAN_DAMPING, SCAN_TRUST = 0.02, 0.5  # of the curvature added to it; the longest step of a node. No measurement
+SCAN_DAMPING, SCAN_TRUST = 0.02, 0.5  # of the curvature, added to it; a node's longest step. No measurement
 MIDDLE = 0.75  # of the range: colour and transmission that a node starts with, for most glass is clear. No measurement
 GAINED = 0.8  # of the cost before: a turn of a race that leaves more has gained nothing. No measurement
 BEHIND = 2.0  # times the leader's cost above it: a runner there is given up. No measurement

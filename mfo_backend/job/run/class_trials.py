@@ -87,9 +87,8 @@ def _with_cost(result: FitResult, seconds: float, passes: float) -> FitResult:
 def better(first: Fitted, again: Fitted, other: MaterialClass, material: Mapping[str, Any]) -> Fitted:
     """The first fit, or that of another class where it is clearly better."""
     before, after = first.result, again.result
-    seconds, passes = before.seconds + after.seconds, before.passes + after.passes
     if before.judgement is None or not is_better(after.judgement, before.judgement, other):
-        return replace(first, result=replace(before, seconds=seconds, passes=passes))
+        return replace(first, result=_with_cost(before, after.seconds, after.passes))
     if before.judgement.verdict is Verdict.CLOSE:
         after = doubted(after, before, material)
     return _taken(first, replace(again, result=after), other, material, other.note)
@@ -105,12 +104,8 @@ def with_plainer_glow(
     glowing = next((other for other in classes if other.glows), None)
     if glowing is None:
         return fitted
-    try:
-        again = fit_from(glowing)
-    except UnrecordableError:
-        return fitted
-    except Exception:
-        traceback.print_exc(file=sys.stderr)
+    again = _tried(lambda: fit_from(glowing))
+    if again is None:
         return fitted
     before, after = fitted.result, again.result
     if before.judgement is None or after.judgement is None:
@@ -120,31 +115,36 @@ def with_plainer_glow(
     if same and is_plainer(after, before, material):
         after = doubted(after, before, material) if alike else after
         return _taken(fitted, replace(again, result=after), glowing, material, PLAINER_GLOW)
-    seconds, passes = before.seconds + after.seconds, before.passes + after.passes
     before = doubted(before, after, material) if alike else before
-    return replace(fitted, result=replace(before, seconds=seconds, passes=passes))
+    return replace(fitted, result=_with_cost(before, after.seconds, after.passes))
 
 
 def with_plainer(fitted: Fitted, material: Mapping[str, Any], fit_plain: Callable[[], Fitted]) -> Fitted:
-    """A result, or a plainer one that looks the same, as unsure as the two are apart."""
-    try:
-        again = fit_plain()
-    except UnrecordableError:
-        return fitted
-    except Exception:
-        traceback.print_exc(file=sys.stderr)
+    """A result, or a plainer one that looks no worse; if they look alike it is as unsure as the two are apart."""
+    again = _tried(fit_plain)
+    if again is None:
         return fitted
     before, after = fitted.result, again.result
-    judged, first = after.judgement, before.judgement
-    if judged is None or first is None or judged.verdict is not Verdict.SAME or not look_alike(first, judged):
+    if before.judgement is None or after.judgement is None:
+        return fitted
+    alike = look_alike(before.judgement, after.judgement)
+    is_nearer = after.judgement.target.visible < before.judgement.target.visible
+    if after.judgement.verdict is not Verdict.SAME or not (alike or is_nearer):
         return replace(fitted, result=_with_cost(before, after.seconds, after.passes))
-    result = replace(
-        doubted(after, before, material),
-        notes=(*after.notes, PLAINER),
-        seconds=before.seconds + after.seconds,
-        passes=before.passes + after.passes,
-    )
+    plainer = doubted(after, before, material) if alike else after
+    result = _with_cost(replace(plainer, notes=(*after.notes, PLAINER)), before.seconds, before.passes)
     return replace(again, result=result, start_image=fitted.start_image)
+
+
+def _tried(fit: Callable[[], Fitted]) -> Fitted | None:
+    """A further fit; None where none holds the material, or it fails, which the log says."""
+    try:
+        return fit()
+    except UnrecordableError:
+        return None
+    except Exception:
+        traceback.print_exc(file=sys.stderr)
+        return None
 
 
 def _taken(first: Fitted, again: Fitted, other: MaterialClass, material: Mapping[str, Any], note: str) -> Fitted:

@@ -12,7 +12,7 @@ from ...render.machine.memory import require_memory
 from ...render.pictures.renderer import Interrupted
 from ...report.live_pictures import LivePictures
 from ...scene.image_file import check_reference, read_image
-from ...types.errors import BadInputError, MfoError
+from ...types.errors import BadInputError, MfoError, first_line
 from ...types.event import BestValues, Event, Progress
 from ...types.image import Image
 from ...types.status import Status
@@ -55,7 +55,7 @@ def run_job(
         return _fail(events, refused.status, str(refused))
     except ImportError as error:  # a package is missing, or there was no memory for its library
         traceback.print_exc(file=sys.stderr)
-        what = str(error).strip().split("\n")[0][:200]
+        what = first_line(error)
         sentence = f"A package cannot be loaded ({what}): run `mfo doctor`, or free some memory."
         return _fail(events, Status.SETUP, sentence)
     except MemoryError:
@@ -63,7 +63,7 @@ def run_job(
         return _fail(events, Status.FAILED, "The fit ran out of memory: lower the resolution or the samples per pixel.")
     except Exception as error:
         traceback.print_exc(file=sys.stderr)
-        what = str(error).strip().split("\n")[0][:200] or "no message"
+        what = first_line(error) or "no message"
         return _fail(
             events, Status.FAILED, f"The fit failed ({type(error).__name__}: {what}): the log holds the details."
         )

@@ -20,6 +20,7 @@ from ...material.plugins.material_kinds import MaterialKinds
 from ...material.principled.random_walk import WALK, Below
 from ...types.errors import BadInputError
 from ...types.light_paths import LightPaths
+from ..camera.first_hits import first_hits
 from ..camera.highlight_cells import highlight_cells
 from ..camera.pixel_cells import PixelCells
 from ..camera.primary_rays import TILE, PrimaryRays, fresh_sampler, tile_order
@@ -29,7 +30,6 @@ from ..transport.ray_starts import RayStarts
 from ..transport.shadow_rays import ShadowRays
 from ..transport.smooth_facets import leaves_on, met_light, seen_side
 from ..transport.traced_radiance import traced_radiance
-from .first_hits import first_hits
 from .merged_lanes import TechniqueLanes, coverage_of, merged_lanes
 from .record_settings import RecordSettings
 from .recorded_background import add_radiance, recorded_background

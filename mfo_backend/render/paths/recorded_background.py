@@ -14,11 +14,11 @@ from numpy.typing import NDArray
 
 from ...material.arrays.own_memory import own_memory
 from ...types.light_paths import LightPaths
+from ..camera.first_hits import FirstHits
 from ..camera.primary_rays import PrimaryRays, fresh_sampler
 from ..lamps.met_lamps import SceneLamps
 from ..transport.below_surface import seen_from_below
 from ..transport.traced_radiance import traced_radiance
-from .first_hits import FirstHits
 
 
 def recorded_background(
@@ -59,6 +59,10 @@ def recorded_background(
         sampler, ray = fresh_sampler(seed, dr.width(index)), ends.onward(rays.ray(index), index)
         add(index, traced_radiance(scene, sampler, ray, light_paths, depth, hide=hide_emitters, walked=True))
         add(index, seen_from_below(scene, ray, sampler, light_paths, depth))
+        if lamps.seen and ends.gone is not None:
+            before_holes = dr.zeros(mi.SurfaceInteraction3f, dr.width(index))
+            before_holes.t = dr.gather(mi.Float, ends.gone, index)
+            add(index, lamps.met(rays.ray(index), before_holes, mi.Bool(True), camera=True))
     index = dr.compress(rest)
     if dr.width(index) > 0 and not hide_emitters:
         from ..transport.cycles_path import seen_world  # can be imported when a variant is set

@@ -118,6 +118,14 @@ def sprinkle(item: Any, source: Any, *, collection: bool) -> None:
     made.render_type, made.instance_collection = "COLLECTION", holder
 
 
+def bright_cube() -> Any:
+    """A small cube that glows, out of sight."""
+    bpy.ops.mesh.primitive_cube_add(size=0.3, location=(0.0, 0.0, -9.0))
+    cube = bpy.context.object
+    cube.data.materials.append(emission_material("Sprinkle", (0.2, 0.5, 1.0)))
+    return cube
+
+
 @pytest.mark.parametrize(
     ("put", "shown"),
     [
@@ -131,9 +139,7 @@ def test_a_hidden_object_is_instanced_where_cycles_shows_it(
 ) -> None:
     """The source of what is scattered is often hidden itself: particles and nodes that name it show it all the same."""
     item = lit_quad(scene)
-    bpy.ops.mesh.primitive_cube_add(size=0.3, location=(0.0, 0.0, -9.0))
-    cube = bpy.context.object
-    cube.data.materials.append(emission_material("Sprinkle", (0.2, 0.5, 1.0)))
+    cube = bright_cube()
     cube.hide_render = True
     put(item, cube)
     bpy.context.view_layer.update()
@@ -161,9 +167,7 @@ def test_modifiers_of_what_is_hidden_are_as_cycles_has_them(
 ) -> None:
     """A cutter and a source are hidden and have modifiers: those of the render, or none where particles are of it."""
     item = lit_quad(scene)
-    bpy.ops.mesh.primitive_cube_add(size=0.3, location=(0.0, 0.0, -9.0))
-    cube = bpy.context.object
-    cube.data.materials.append(emission_material("Sprinkle", (0.2, 0.5, 1.0)))
+    cube = bright_cube()
     around = cube.modifiers.new("Round", "SUBSURF")
     around.levels, around.render_levels = 0, 3
     outer, inner = bpy.data.collections.new("Outer"), bpy.data.collections.new("Inner")

@@ -222,6 +222,9 @@ def test_a_plainer_material_that_looks_the_same_is_the_result():
     # as unsure as the two are apart
     assert found.certainty["specular_ior_level"].level is not Level.DETERMINED
     assert found.certainty["metallic"].level is Level.DETERMINED
+    worse = of_whole_paths(0.02, Verdict.SAME, coat_weight=0.5)
+    nearer = module.with_plainer(worse, material(), lambda: plain).result
+    assert (nearer.recovered, nearer.certainty) == (plain.result.recovered, plain.result.certainty)
     for other in (of_whole_paths(0.02, Verdict.SAME), of_whole_paths(0.2, Verdict.DIFFERENT)):
         kept = module.with_plainer(rich, material(), lambda other=other: other).result
         assert (kept.recovered, kept.certainty) == (rich.result.recovered, rich.result.certainty)

@@ -18,10 +18,10 @@ import drjit as dr
 import mitsuba as mi
 
 from ...types.light_paths import NO_LIMIT
-from ..camera.primary_rays import PrimaryRays
 from ..random_numbers.even_points import even_points
 from ..transport.camera_view import CameraView
 from ..transport.ray_starts import RayStarts
+from .primary_rays import PrimaryRays
 
 
 @dataclass(frozen=True)

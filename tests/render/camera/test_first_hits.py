@@ -68,6 +68,19 @@ def test_what_shows_through_holes_is_as_path_traced(lights, textured, mixed, hol
     assert error < 0.05  # half a pixel of 400 rays is left to chance
 
 
+IN_FRONT = """<emitter type="blender_area"><transform name="to_world"><scale x="0.2" y="0.2"/><lookat
+origin="0.3, -2, 0.6" target="0, -4, 1" up="0, 0, 1"/></transform><rgb name="radiance" value="3, 2, 1"/>
+<boolean name="camera" value="true"/></emitter>"""
+
+
+def test_a_lamp_before_a_hole_is_seen(holes, tmp_path):
+    """A ray that goes on behind the hole has met it already."""
+    got, expected = recorded(load(tmp_path, SKY + IN_FRONT + FLOOR, holes))
+    dark, _ = recorded(load(tmp_path, SKY + FLOOR, holes))
+    assert expected.mean() > 1.1 * dark.mean()
+    assert got.mean(axis=0) == pytest.approx(expected.mean(axis=0), rel=0.01)
+
+
 def test_nothing_is_seen_behind_more_holes_than_light_may_pass(tmp_path):
     got, expected = recorded(load(tmp_path, SKY + FLOOR, None, transparent_bounces=1))
     assert got.mean(axis=0) == pytest.approx(expected.mean(axis=0), rel=0.01)
