@@ -134,12 +134,31 @@ def _round_terminator(rig: Rig, draw: Draw) -> None:
     rig.box.shadow_terminator_geometry_offset = float(draw.uniform(0.0, 1.0))
 
 
+def _decal(rig: Rig, draw: Draw) -> None:
+    """A film that is half clear on the ball and on the floor, less than a millimetre above them."""
+    gap = 10.0 ** float(draw.uniform(-4.0, -3.0))
+    sheet = bpy.data.meshes.new("Decal")
+    corners = [(x, y, gap) for x, y in ((-2.5, -2.0), (0.5, -2.0), (0.5, 1.0), (-2.5, 1.0))]
+    sheet.from_pydata(corners, [], [(0, 1, 2, 3)])
+    film = rig.target.data.copy()
+    film.materials.clear()
+    material = rig.floor.data.materials[0].copy()
+    node = next(node for node in material.node_tree.nodes if node.type == "BSDF_PRINCIPLED")
+    node.inputs["Alpha"].default_value = float(draw.uniform(0.2, 0.7))
+    for name, mesh in (("Decal", sheet), ("Film", film)):
+        mesh.materials.append(material)
+        item = bpy.data.objects.new(name, mesh)
+        rig.scene.collection.objects.link(item)
+        if mesh is film:
+            item.location, item.scale = rig.target.location, (1.0 + gap,) * 3
+
+
 def _all() -> Iterator[Setting]:
     exported = {
         "scattered by nodes": _scattered, "armature": _armature, "twisted": _twisted, "sharp edges": _sharp_edges,
         "linked copy": _linked_copy, "filter width": _filter, "shift and scale": _shift,
         "far clip": _far_clip, "scaled camera": _odd_camera, "percentage": _percentage,
-        "blurred gloss": _blurred_gloss, "box terminator": _round_terminator,
+        "blurred gloss": _blurred_gloss, "box terminator": _round_terminator, "decal": _decal,
     }  # fmt: skip
     yield from (Setting(name, put) for name, put in exported.items())
     yield Setting("clamped", _clamped, ("lamping",))

@@ -15,7 +15,7 @@ GRID_STEPS = 1 << 16  # across the whole scene; triangles that agree to one of t
 # the axes and turned: the hidden one shows in 50 to 73 % of the pixels at 0, in 4 to 32 % at 1e-7, in at most 0.3 %
 # at 3e-7 and in none at 1e-6. Larger: faces are named that do not show. Smaller: such are not named that do.
 COPLANAR = 3e-7
-CLOSE = 1e-3  # of a triangle's longest side: corners so near are in the same place
+CLOSE = 1e-3  # of a triangle's longest side: corners so near are the same where the planes are
 
 
 def shared_faces(places: Sequence[tuple[str, TriangleMesh]]) -> list[tuple[str, str]]:
@@ -31,7 +31,7 @@ def shared_faces(places: Sequence[tuple[str, TriangleMesh]]) -> list[tuple[str, 
     same = np.flatnonzero(keys[order[1:]] == keys[order[:-1]])
     first, second = order[same], order[same + 1]
     ends = np.cumsum([len(mesh.triangles) for _, mesh in places])
-    close = _in_place(_corners(places, ends, first), _corners(places, ends, second))
+    close = _in_place(_corners(places, ends, first), _corners(places, ends, second), COPLANAR * size)
     owners = [np.searchsorted(ends, each[close], side="right") for each in (first, second)]
     pairs = np.unique(np.stack(owners, axis=1), axis=0)
     return list(dict.fromkeys((places[a][0], places[b][0]) for a, b in pairs))
@@ -98,13 +98,15 @@ def _corners(
     return found
 
 
-def _in_place(first: NDArray[np.float64], second: NDArray[np.float64]) -> NDArray[np.bool_]:
-    """Whether triangles (n, 3, 3) with an area have the same corners in any order."""
+def _in_place(first: NDArray[np.float64], second: NDArray[np.float64], gap: float) -> NDArray[np.bool_]:
+    """Whether triangles (n, 3, 3) with an area have the same corners in any order, and planes no further than a gap."""
     sides = np.linalg.norm(first - np.roll(first, 1, axis=1), axis=2)
-    area = np.linalg.norm(np.cross(first[:, 1] - first[:, 0], first[:, 2] - first[:, 0]), axis=1)
+    normal = np.cross(first[:, 1] - first[:, 0], first[:, 2] - first[:, 0])
+    area = np.linalg.norm(normal, axis=1)
+    above = np.abs(np.einsum("ijk,ik->ij", second - first[:, :1], normal)).max(axis=1)
     apart = np.linalg.norm(first[:, :, None] - second[:, None], axis=3).min(axis=2).max(axis=1)
     longest = sides.max(axis=1)
-    return (apart <= CLOSE * longest) & (area > CLOSE * longest**2)
+    return (apart <= CLOSE * longest) & (above <= gap * area) & (area > CLOSE * longest**2)
 
 
 def _keys(points: NDArray[np.float64], triangles: NDArray[np.int32]) -> NDArray[np.int64]:

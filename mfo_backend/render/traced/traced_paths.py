@@ -30,9 +30,9 @@ from ..pictures.mitsuba_renderer import MitsubaRenderer
 from ..pictures.pass_counter import with_derivatives
 from ..random_numbers.path_random import PathRandom
 from ..transport.camera_view import CameraView
-from ..transport.cycles_path import DIFFUSE, TRANSMITS, seen_world
+from ..transport.cycles_path import DIFFUSE, seen_world
 from ..transport.shadow_rays import ShadowRays, is_unsampled, left_of, sample_light
-from ..transport.smooth_facets import leaves_on, met_light, seen_side
+from ..transport.smooth_facets import TRANSMITS, leaves_on, met_light, seen_side
 from .traced_target import TracedTarget
 
 LANES_OF_A_LAUNCH = 1 << 17  # of one launch: about a tenth of a second on two cores, so that a fit can stop between two

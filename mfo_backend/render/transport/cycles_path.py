@@ -26,13 +26,12 @@ from ..lamps.met_lamps import SceneLamps, alone
 from .absorption import Inside
 from .camera_view import CameraView
 from .shadow_rays import ShadowRays, is_unsampled, sample_light
-from .smooth_facets import leaves_on, met_light, seen_side
+from .smooth_facets import TRANSMITS, leaves_on, met_light, seen_side
 
 PLUGIN_NAME = "cycles_path"
 CERTAIN = 1e30  # density before the first bounce, and of mirrors
 _LIMITS = ("diffuse_bounces", "glossy_bounces", "transmission_bounces")
 DIFFUSE = mi.BSDFFlags.DiffuseReflection | mi.BSDFFlags.DiffuseTransmission
-TRANSMITS = mi.BSDFFlags.GlossyTransmission | mi.BSDFFlags.DeltaTransmission | mi.BSDFFlags.DiffuseTransmission
 
 
 class CyclesPath(RBIntegrator):

@@ -14,7 +14,7 @@ sent out see all of these as they are, and so does the light of a uniform world,
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import drjit as dr
@@ -24,7 +24,7 @@ import numpy as np
 from ...material.arrays.own_memory import own_memory
 from .absorption import Absorption, Inside
 from .ray_starts import RayStarts
-from .smooth_facets import ShadowTerminator, follows_cycles, shape_number, shape_table
+from .smooth_facets import TRANSMITS, ShadowTerminator, follows_cycles, leaves_on, shape_number, shape_table
 
 SHADOW_TRANSMISSION = "shadow_transmission"
 UNIFORM = "ConstantBackgroundEmitter"  # Mitsuba's class of the plugin `constant`
@@ -58,8 +58,6 @@ class ShadowRays:
         self.lets_through = follows_cycles(scene) and any(
             s.bsdf() is not None and mi.has_flag(s.bsdf().flags(), mi.BSDFFlags.Null) for s in scene.shapes()
         )
-        unlit = marked or self.lets_through or self._shadowless or self.absorption
-        self.plain = self.starts.are_usual and not unlit and not self.terminator.lifts
 
     def passed(
         self,
@@ -77,11 +75,14 @@ class ShadowRays:
         casts = mi.Bool(active)
         for lamp in self._shadowless:
             casts &= ds.emitter != mi.EmitterPtr(lamp)
-        ray = self.starts.ray_to(si, ds.p, self.terminator.lift(si, ds.d, casts))
+        # light that Cycles leaves to directions of materials: none starts above its facet, or leaves it backwards
+        drawn = is_unsampled(ds)
+        lost = drawn & ~leaves_on(self._scene, si, si.to_local(ds.d), _crosses(si, ds))
+        ray = self.starts.ray_to(si, ds.p, self.terminator.lift(si, ds.d, casts & ~drawn))
         begin = self.absorption.outside() if inside is None else inside
         begin = self.absorption.beyond(begin, si, si.to_local(ds.d), casts)
         if not self._marked and not self.lets_through:
-            hidden = self._scene.ray_test(ray, casts)
+            hidden = lost | self._scene.ray_test(ray, casts & ~lost)
             lengths = self.absorption.lengths(begin, ds.dist)
             return Passed(dr.select(hidden, mi.Color3f(0), 1), mi.Bool(False), mi.UInt32(0), lengths)
         made, limit = mi.UInt32(passages), dr.opaque(mi.UInt32, self.most)
@@ -89,7 +90,8 @@ class ShadowRays:
         asked = mi.Bool(True)
         for world in self._uniform:
             asked &= ds.emitter != mi.EmitterPtr(world)
-        return self._followed(mi.Ray3f(ray), mi.Point3f(ds.p), casts, mi.BSDFPtr(of), most, asked, begin)
+        passed = self._followed(mi.Ray3f(ray), mi.Point3f(ds.p), casts & ~lost, mi.BSDFPtr(of), most, asked, begin)
+        return replace(passed, through=dr.select(lost, 0, passed.through))
 
     def left(self, passed: Passed) -> mi.Color3f:
         """The share of light (RGB) that surfaces and volumes leave."""
@@ -159,8 +161,6 @@ def sample_light(
     Further how often the light went through the BSDF `of`, and how far inside of each absorbing material; both take
     nothing of it here. What `inside` means is said at `passed`.
     """
-    if shadows.plain:
-        return *scene.sample_emitter_direction(si, u, True, active), mi.UInt32(0), []
     ds, light = scene.sample_emitter_direction(si, u, False, active)
     passed = shadows.passed(si, ds, active & (ds.pdf > 0.0), of, passages, inside)
     ds.pdf = dr.select(dr.max(passed.through) > 0, ds.pdf, 0.0)
@@ -172,6 +172,12 @@ def is_unsampled(ds: mi.DirectionSample3f) -> mi.Bool:
     flags = ds.emitter.flags()
     varies = mi.has_flag(flags, mi.EmitterFlags.SpatiallyVarying)
     return mi.has_flag(flags, mi.EmitterFlags.Infinite) & ~varies & ~ds.delta
+
+
+def _crosses(si: mi.SurfaceInteraction3f, ds: mi.DirectionSample3f) -> mi.Bool:
+    """Whether light of a sample comes through a material to where it is seen from."""
+    lets = (si.bsdf().flags() & TRANSMITS) != 0
+    return lets & (si.wi.z * si.to_local(ds.d).z < 0.0)
 
 
 def left_of(alpha: mi.Float | None, times: mi.UInt32) -> tuple[mi.Float | float, mi.Float | float]:

@@ -26,6 +26,7 @@ GEOMETRY_OFFSET, SHADING_OFFSET = "shadow_geometry_offset", "shadow_shading_offs
 # Cosine between the normals of a triangle's corners above which its own shadow lies in the last 0.6 degrees of the
 # light, where the cosine is below 0.01
 FLAT = 0.99995
+TRANSMITS = mi.BSDFFlags.GlossyTransmission | mi.BSDFFlags.DeltaTransmission | mi.BSDFFlags.DiffuseTransmission
 
 
 class ShadowTerminator:

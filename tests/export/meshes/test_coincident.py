@@ -33,6 +33,13 @@ def test_a_face_twice_is_found_within_an_object_and_between_two() -> None:
     assert shared_faces([]) == []
 
 
+def test_a_label_just_above_faces_of_its_own_shape_is_not_in_their_place() -> None:
+    above, moved = FACE + np.array([0, 0, 2e-4]), FACE + np.array([2e-4, 0, 0])
+    ground = ("Ground", mesh([100 * FACE - 1.0]))  # which makes what is looked at coarse
+    assert shared_faces([("Bottle", mesh([FACE])), ("Label", mesh([above])), ground]) == []
+    assert shared_faces([("Half", mesh([FACE])), ("Mirrored", mesh([moved])), ground]) == [("Half", "Mirrored")]
+
+
 def test_doubled_faces_among_many_of_several_objects_are_those_that_comparing_all_finds() -> None:
     random = np.random.default_rng(2)
     faces = random.random((60, 3, 3)).astype(np.float32)
