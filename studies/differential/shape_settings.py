@@ -6,6 +6,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from typing import Any
 
+import bmesh
 import bpy
 
 from .rig import Draw, Rig, Setting
@@ -153,12 +154,29 @@ def _decal(rig: Rig, draw: Draw) -> None:
             item.location, item.scale = rig.target.location, (1.0 + gap,) * 3
 
 
+def _smooth_shell(rig: Rig, draw: Draw) -> None:
+    """The box without its top, with walls, and normals that lean from its facets towards their rims; little lamp."""
+    bpy.context.view_layer.objects.active = rig.box
+    bpy.ops.object.mode_set(mode="EDIT")
+    edited = bmesh.from_edit_mesh(rig.box.data)
+    edited.faces.ensure_lookup_table()
+    bmesh.ops.delete(edited, geom=[max(edited.faces, key=lambda face: face.calc_center_median().z)], context="FACES")
+    bmesh.update_edit_mesh(rig.box.data)
+    bpy.ops.object.mode_set(mode="OBJECT")
+    bpy.context.view_layer.objects.active = rig.target
+    for polygon in rig.box.data.polygons:
+        polygon.use_smooth = True
+    rig.box.modifiers.new("Walls", "SOLIDIFY").thickness = float(draw.uniform(0.03, 0.1))
+    rig.light.data.energy *= 0.1
+
+
 def _all() -> Iterator[Setting]:
     exported = {
         "scattered by nodes": _scattered, "armature": _armature, "twisted": _twisted, "sharp edges": _sharp_edges,
         "linked copy": _linked_copy, "filter width": _filter, "shift and scale": _shift,
         "far clip": _far_clip, "scaled camera": _odd_camera, "percentage": _percentage,
         "blurred gloss": _blurred_gloss, "box terminator": _round_terminator, "decal": _decal,
+        "smooth shell": _smooth_shell,
     }  # fmt: skip
     yield from (Setting(name, put) for name, put in exported.items())
     yield Setting("clamped", _clamped, ("lamping",))

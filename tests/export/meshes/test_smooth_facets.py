@@ -226,9 +226,9 @@ def test_light_of_a_plain_world_starts_on_the_facets(
     kind: str, scene: Any, export: Any, render_cycles: Any, mitsuba: Any
 ) -> None:
     """Cycles sends no shadow rays to it. With ours above the facets the shell was 3 and 4 % too bright."""
-    from ..materials.test_node_graphs import renderer_and_cycles
-
     from mfo_backend.render.paths.recorded_scene import RecordedScene
+
+    from ..materials.test_node_graphs import renderer_and_cycles
 
     renderer, theirs = renderer_and_cycles(export, render_cycles, shell(scene, kind))
     mask = renderer.target_mask()
