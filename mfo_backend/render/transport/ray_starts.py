@@ -1,8 +1,10 @@
 # SPDX-License-Identifier: Apache-2.0
 """Where rays start that leave a surface: a little above it, so that they do not meet it again.
 
-Mitsuba starts them 0.09 mm (1 + d) above, d the distance from zero: beyond a decal that lies closer on its wall. Here
-it is `EPSILON` (1 + d), and a small shape counts by its own size. Choose the variant before importing this.
+Mitsuba starts them 0.09 mm (1 + d) above, d the distance from zero: beyond a decal that lies closer on its wall. In
+scenes of Cycles it is `EPSILON` (1 + d). A small shape counts by its own size.
+
+Choose the variant before importing this.
 """
 
 # pyright: reportArgumentType=false, reportCallIssue=false, reportOperatorIssue=false, reportAssignmentType=false
@@ -17,19 +19,18 @@ import drjit as dr
 import mitsuba as mi
 import numpy as np
 
-from .smooth_facets import shape_table
+from .smooth_facets import follows_cycles, shape_table
 
-# Half steps of a float at 1; Mitsuba has 1,500 (mitsuba/core/math.h, RayEpsilon). Of two million rays that leave or
-# pass a square, at any angle, none meets it again for sides of 1 m to 200 m, up to 100 m from zero, alone and as an
-# instance, and 10 for one of 1 km; with 40 it is 100, and 2,281 for one of 10 km
+MITSUBA = 1500.0 * 2.0**-24  # half steps of a float at 1 (mitsuba/core/math.h, RayEpsilon)
+# Of two million rays that leave or pass a square, at any angle, none meets it again for sides of 1 m to 200 m, up to
+# 100 m from zero, alone and as an instance, and 10 for one of 1 km; with 40 half steps it is 100, and 2,281 for 10 km
 EPSILON = 75.0 * 2.0**-24
 # Of the way to a light, as Mitsuba's; but no more than ten `EPSILON` at the light. With Mitsuba's alone light of a ball
 # went past a film of 0.5 mm around it: a floor was 0.9 % too bright
-SHADOW_EPSILON = 15000.0 * 2.0**-24
-LIGHT_EPSILON = 10.0 * EPSILON
-# Metres: shapes that reach no further from zero are small. Rays start `EPSILON` of their reach above them, as many
-# steps of a float as at 1. With Mitsuba's a scene of millimetres was 0.83 % darker than in Cycles and one of
-# centimetres 0.12 %; both are within 0.02 % (docs/notebook/differential.md)
+SHADOW_EPSILON = 10.0 * MITSUBA
+# Metres: shapes that reach no further from zero are small. Rays start as many steps of a float above them as at 1 m.
+# With Mitsuba's a scene of millimetres was 0.83 % darker than in Cycles and one of centimetres 0.12 %; both were within
+# 0.02 % (docs/notebook/differential.md)
 SMALL = 0.1
 
 
@@ -41,6 +42,7 @@ class RayStarts:
         boxes = [shape.bbox() for shape in shapes]
         reach = [float(np.max(np.abs([np.ravel(box.min), np.ravel(box.max)]))) for box in boxes]
         small = [(shape, far) for shape, far in zip(shapes, reach, strict=True) if 0.0 < far <= SMALL]
+        self._epsilon = EPSILON if follows_cycles(scene) else MITSUBA
         self._reach = shape_table(*map(list, zip(*small, strict=True)), mi.Float) if small else None
 
     def ray(self, si: mi.SurfaceInteraction3f, direction: mi.Vector3f) -> mi.Ray3f:
@@ -53,7 +55,7 @@ class RayStarts:
         start = self._start(si, point, end - point)
         way = end - start
         far = dr.norm(way)
-        before = LIGHT_EPSILON * (1.0 + dr.maximum(dr.max(dr.abs(end)), far))
+        before = 10.0 * self._epsilon * (1.0 + dr.maximum(dr.max(dr.abs(end)), far))
         ends = far - dr.minimum(SHADOW_EPSILON * far, before)
         return mi.Ray3f(start, way / far, ends, si.time, si.wavelengths)
 
@@ -64,4 +66,4 @@ class RayStarts:
             known = number < dr.opaque(mi.UInt32, dr.width(self._reach))
             reach = dr.gather(mi.Float, self._reach, number, known)
             size = dr.select(reach > 0.0, reach, size)
-        return point + mi.Vector3f(si.n) * dr.mulsign(EPSILON * size, dr.dot(si.n, direction))
+        return point + mi.Vector3f(si.n) * dr.mulsign(self._epsilon * size, dr.dot(si.n, direction))

@@ -13,12 +13,21 @@ import pytest
 from mfo_backend.render.machine.variant import load_variant
 
 VARIANT, COUNT = load_variant(), 100_000
+CYCLES = {"integrator": {"type": "cycles_path"}}
 
 
 @pytest.fixture(autouse=True)
 def _variant() -> None:
     if mi.variant() != VARIANT:
         mi.set_variant(VARIANT)
+
+
+def loaded(**parts: Any) -> Any:
+    """A scene, perhaps one whose pictures are as Cycles makes them."""
+    from mfo_backend.render.transport import cycles_path
+
+    cycles_path.register()
+    return mi.load_dict({"type": "scene", **parts})
 
 
 def placed(kind: str, at: list[float], size: float) -> dict[str, Any]:
@@ -29,10 +38,11 @@ def placed(kind: str, at: list[float], size: float) -> dict[str, Any]:
 
 @pytest.mark.parametrize(("size", "away"), [(1e-4, 0.0), (1e-3, 0.0), (1.0, 0.0), (1e3, 0.0), (0.1, 0.7), (1.0, 9.0)])
 @pytest.mark.parametrize("kind", ["sphere", "cube", "rectangle"])
-def test_rays_do_not_meet_what_they_leave(kind: str, size: float, away: float) -> None:
+@pytest.mark.parametrize("integrator", [{}, CYCLES], ids=["of Mitsuba", "of Cycles"])
+def test_rays_do_not_meet_what_they_leave(integrator: dict[str, Any], kind: str, size: float, away: float) -> None:
     from mfo_backend.render.transport.ray_starts import RayStarts
 
-    scene = mi.load_dict({"type": "scene", "shape": placed(kind, [away, away, 0.1 * away], size)})
+    scene = loaded(**integrator, shape=placed(kind, [away, away, 0.1 * away], size))
     sampler = mi.load_dict({"type": "independent"})
     sampler.seed(1, COUNT)
     there = scene.shapes()[0].sample_position(0.0, sampler.next_2d())
@@ -117,7 +127,7 @@ def test_rays_meet_what_a_decal_lies_on(gap: float, away: float) -> None:
         }
         for name, height in heights.items()
     }
-    scene = mi.load_dict({"type": "scene", **sheets})
+    scene = loaded(**CYCLES, **sheets)
     down = mi.Vector3f(0.0, 0.6, -0.8)
     si = scene.ray_intersect(mi.Ray3f(mi.Point3f(away + 0.3, 0.1, 2.0), down))
     behind = scene.ray_intersect(RayStarts(scene).ray(si, down))
