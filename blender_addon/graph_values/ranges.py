@@ -44,8 +44,8 @@ SETTINGS = {
     ("ShaderNodeBrightContrast", "Brightness"): Range(-0.5, 0.5, SETTING),
     ("ShaderNodeBrightContrast", "Contrast"): Range(-1.0, 1.0, SETTING),
     ("ShaderNodeGamma", "Gamma"): Range(0.2, 5.0, SETTING, logarithmic=True, step=LOGARITHMIC_STEP),
-    ("ShaderNodeBump", "Strength"): Range(0.0, 1.0, SETTING, step=ROUGH_STEP),
-    ("ShaderNodeNormalMap", "Strength"): Range(0.0, 2.0, SETTING, step=ROUGH_STEP),
+    ("ShaderNodeBump", "Strength"): Range(0.0, 1.0, SETTING, step=ROUGH_STEP, scanned=True),
+    ("ShaderNodeNormalMap", "Strength"): Range(0.0, 2.0, SETTING, step=ROUGH_STEP, scanned=True),
     ("ShaderNodeTexNoise", "Detail"): Range(0.0, 15.0, step=ROUGH_STEP),
     ("ShaderNodeTexNoise", "Distortion"): Range(-2.0, 2.0, step=ROUGH_STEP),
 }
@@ -88,4 +88,4 @@ def range_of_stop(ramp: bpy.types.ColorRamp, number: int) -> Range:
 def _around(known: Range, value: float) -> Range:
     """The range, wider where the value is outside of it."""
     lower, upper = min(known.lower, value), max(known.upper, value)
-    return Range(lower, upper, known.group, known.logarithmic and lower > 0.0, known.step)
+    return Range(lower, upper, known.group, known.logarithmic and lower > 0.0, known.step, known.scanned)

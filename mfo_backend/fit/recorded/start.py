@@ -18,8 +18,8 @@ from ..search.race_starts import race
 from ..squares.problem import Problem
 from ..squares.residuals import log_residual
 from .recording import Recording, Setting, Vector
+from .scanned_values import Placed, best_scanned, placed
 from .solve import solve
-from .texture_scales import Placed, best_scales, placed
 from .where_to_look import all_groups, detail_grid, edges_of_light, fewer_groups, thinned_grid
 
 SPARE = 1.5  # times the lanes a start is found on are recorded for it: its tiles are chosen by what they show
@@ -59,16 +59,16 @@ def start_from_nothing(setting: Setting) -> Started:
         stage.picture = None if recording.thinned else recording.preview  # others have no picture for first guesses
         lanes = plan.scan_lanes if setting.sampled else plan.exact_scan_lanes
         few = recording.problem(fewer_groups(groups, setting.reference, lanes), make, calm=True)
-        scales = best_scales(setting, recording)
-        starts = _starts(setting, few, stage, scales[0])
+        scanned = best_scanned(setting, recording)
+        starts = _starts(setting, few, stage, scanned[0])
         stage.vector = starts[0] if starts else None
     with course.stage("start") as stage:
         if not recording.thinned:
             stage.picture = recording.preview
         lanes = plan.start_lanes if setting.sampled else plan.exact_start_lanes
         more = recording.problem(fewer_groups(groups, setting.reference, lanes), make, calm=True)
-        users = [placed(setting.user, scale) for scale in scales]
-        others = [*users, placed(random_start(setting.table, setting.seed), scales[0])]
+        users = [placed(setting.user, values) for values in scanned]
+        others = [*users, placed(random_start(setting.table, setting.seed), scanned[0])]
         basins = race(
             lambda x, evaluations, known: solve(setting, more, x, evaluations, stage=stage, known=known),
             [*starts, *others], setting.table, plan, course.should_stop,
@@ -104,18 +104,18 @@ def _groups(recording: Recording) -> LaneGroups:
     return all_groups(recording.paths, 1, recording.setting.reference)
 
 
-def _starts(setting: Setting, problem: Problem, stage: Stage, scale: Placed) -> list[Vector]:
-    """Where two opposite starts agree, their ends; else the best nodes of the scan. All begin at this `scale`."""
+def _starts(setting: Setting, problem: Problem, stage: Stage, values: Placed) -> list[Vector]:
+    """Where two opposite starts agree, their ends; else the best nodes of the scan. All begin at these `values`."""
     plan, table, scanned = setting.plan, setting.table, setting.scene.model.scanned
     starts: list[Vector] = []
     if plan.same_cost:
         evaluations = plan.agreement_evaluations if setting.sampled else plan.exact_agreement_evaluations
         exact = {} if setting.sampled else {"metal_width": ROUGHER_WIDTH, "most": 0.5 * plan.seen_rms**2}
         starts = agreeing_ends(
-            lambda start: solve(setting, problem, placed(start, scale), evaluations, stage=stage),
+            lambda start: solve(setting, problem, placed(start, values), evaluations, stage=stage),
             table, scanned, plan.same_cost, **exact,
         )  # fmt: skip
     if not starts and plan.scan:
         nodes = scan(setting.course.watch(stage, problem.equations), table, scanned)
-        starts = [placed(start, scale) for start in best_starts(nodes, plan.starts)]
+        starts = [placed(start, values) for start in best_starts(nodes, plan.starts)]
     return starts
