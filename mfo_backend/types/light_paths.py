@@ -24,6 +24,8 @@ class LightPaths:
         Bounces of one kind after which a path ends.
     transparent_bounces
         Surfaces that light goes straight through one after the other.
+    min_light_bounces, min_transparent_bounces
+        How many of these a path has before chance may end it: which is seen where samples are clamped alone.
     """
 
     filter_glossy: float = 0.0
@@ -32,3 +34,5 @@ class LightPaths:
     glossy_bounces: int = NO_LIMIT
     transmission_bounces: int = NO_LIMIT
     transparent_bounces: int = TRANSPARENT_BOUNCES
+    min_light_bounces: int = 0
+    min_transparent_bounces: int = 0

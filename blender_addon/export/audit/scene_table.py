@@ -22,8 +22,9 @@ SCENE = Owner(
 SCENE_CYCLES = Owner(
     exported="blur_glossy caustics_reflective caustics_refractive diffuse_bounces film_exposure filter_width "
     "glossy_bounces max_bounces pixel_filter_type sample_clamp_direct sample_clamp_indirect transmission_bounces "
-    "dicing_rate max_subdivisions feature_set transparent_max_bounces use_light_tree",
-    # samplers, denoisers, guiding and roulette change the noise and no mean; fast GI's numbers need fast GI
+    "dicing_rate max_subdivisions feature_set transparent_max_bounces use_light_tree min_light_bounces "
+    "min_transparent_bounces",
+    # samplers, denoisers and guiding change the noise and no mean; fast GI's numbers need fast GI
     no_effect="adaptive_min_samples adaptive_threshold ao_bounces ao_bounces_render auto_scrambling_distance bake_type "
     "camera_cull_margin debug_bvh_layout debug_bvh_time_steps debug_bvh_type debug_texture_cache_preserve_unused "
     "debug_use_compact_bvh debug_use_cpu_avx2 debug_use_cpu_sse42 debug_use_cuda_adaptive_compile debug_use_hair_bvh "
@@ -31,8 +32,8 @@ SCENE_CYCLES = Owner(
     "debug_use_texture_cache_eviction denoiser denoising_input_passes denoising_prefilter denoising_quality "
     "denoising_use_gpu device dicing_camera direct_light_sampling_type distance_cull_margin fast_gi_method "
     "film_transparent_roughness guiding_directional_sampling_type guiding_distribution_type "
-    "guiding_roughness_threshold guiding_training_samples light_sampling_threshold min_light_bounces "
-    "min_transparent_bounces offscreen_dicing_scale preview_adaptive_min_samples preview_adaptive_threshold "
+    "guiding_roughness_threshold guiding_training_samples light_sampling_threshold "
+    "offscreen_dicing_scale preview_adaptive_min_samples preview_adaptive_threshold "
     "preview_denoiser preview_denoising_input_passes preview_denoising_prefilter preview_denoising_quality "
     "preview_denoising_start_sample preview_denoising_use_gpu preview_dicing_rate preview_pause preview_samples "
     "preview_scrambling_distance rolling_shutter_duration rolling_shutter_type sample_offset sample_subset_length "

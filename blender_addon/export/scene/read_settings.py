@@ -110,4 +110,6 @@ def _read_light_paths(cycles: bpy.types.PropertyGroup, findings: Findings) -> di
         "clamp_indirect": cycles.sample_clamp_indirect * cycles.film_exposure,
         **{f"{kind}_bounces": getattr(cycles, f"{kind}_bounces") for kind in BOUNCES},
         "transparent_bounces": cycles.transparent_max_bounces,
+        "min_light_bounces": cycles.min_light_bounces,
+        "min_transparent_bounces": cycles.min_transparent_bounces,
     }

@@ -80,11 +80,13 @@ def light_paths_from_json(data: Any, where: str) -> LightPaths | None:
     if data is None:
         return None
     counts = ("diffuse_bounces", "glossy_bounces", "transmission_bounces")
+    fewest = ("min_light_bounces", "min_transparent_bounces")
     others = ("filter_glossy", "clamp_indirect", "transparent_bounces")
-    paths = CheckedObject(data, f"{where}: light_paths", (*others, *counts))
+    paths = CheckedObject(data, f"{where}: light_paths", (*others, *counts, *fewest))
     return LightPaths(
         filter_glossy=paths.number("filter_glossy", 0.0, 1e4, 0.0),
         clamp_indirect=paths.number("clamp_indirect", 0.0, 1e12, 0.0),
         transparent_bounces=paths.integer("transparent_bounces", 0, NO_LIMIT, TRANSPARENT_BOUNCES),
         **{name: paths.integer(name, 0, NO_LIMIT, NO_LIMIT) for name in counts},
+        **{name: paths.integer(name, 0, NO_LIMIT, 0) for name in fewest},
     )

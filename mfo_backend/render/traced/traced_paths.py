@@ -30,7 +30,7 @@ from ..pictures.mitsuba_renderer import MitsubaRenderer
 from ..pictures.pass_counter import with_derivatives
 from ..random_numbers.path_random import PathRandom
 from ..transport.camera_view import CameraView
-from ..transport.cycles_path import DIFFUSE, seen_world
+from ..transport.cycles_path import DIFFUSE, continuation, seen_world
 from ..transport.shadow_rays import ShadowRays, is_unsampled, left_of, sample_light
 from ..transport.smooth_facets import TRANSMITS, leaves_on, met_light, seen_side
 from .traced_target import TracedTarget
@@ -166,10 +166,13 @@ class TracedPaths:
         if self._light_paths is not None:
             # the least density so far, and bounces of each kind
             state |= {"least": mi.Float(1e30), "bounces": [mi.UInt32(0) for _ in range(3)]}
+            # how many of such paths chance leaves in Cycles, and whether it was straight that this one came
+            state |= {"survival": mi.Float(1.0), "straight_on": mi.Bool(False)}
 
         def body(s):
             ray, beta, total, active, depth = s["ray"], list(s["beta"]), list(s["total"]), s["active"], s["depth"]
-            straight = depth == s["passages"]
+            bounces = depth - s["passages"]
+            straight, survival, chance_to_go_on = bounces == 0, *self._survival(s, bounces)
             if self._view.hides:
                 first = self._view.met(ray, active, straight=straight)
                 si = seen_side(scene, first.compute_surface_interaction(ray, mi.RayFlags.All, active))
@@ -195,13 +198,13 @@ class TracedPaths:
             if self._glow is not None:
                 own = met & (emitter == mi.EmitterPtr(self._glow))
             emission = dr.select(active & ~own, emission * seen, 0.0)
-            emission *= self._clamp(beta[0] * emission, depth >= 2)
+            emission *= self._clamp(beta[0] * emission / survival, bounces >= 2)
             total = [t + b * emission for t, b in zip(total, beta, strict=True)]
             if self._lamps:
                 likely = dr.select(s["delta"], 1e30, s["density"])
                 sent_from = s["before"].p if self._shadows.lets_through else None
                 shine = self._lamps.met(ray, si, active, density=likely, camera=straight, sent_from=sent_from)
-                shine *= self._clamp(beta[0] * shine, depth >= 2)
+                shine *= self._clamp(beta[0] * shine / survival, bounces >= 2)
                 total = [t + b * shine for t, b in zip(total, beta, strict=True)]
             active = active & si.is_valid() & ~last
             scatters = active & (s["left"] > 1)
@@ -226,7 +229,7 @@ class TracedPaths:
             local, kind = found.drawn, found.kind
             if self._glow is not None:
                 glow = [dr.select(own, c, 0.0) for c in found.glow]
-                kept = self._clamp(beta[0] * glow[0], depth >= 2)
+                kept = self._clamp(beta[0] * glow[0] / survival, bounces >= 2)
                 total[0] += beta[0] * glow[0] * kept
                 for k in range(directions):
                     total[1 + k] += (beta[1 + k] * glow[0] + beta[0] * glow[1 + k]) * kept
@@ -252,7 +255,8 @@ class TracedPaths:
                 sent.append(beta[1 + k] * f_light[0] + beta[0] * f_light[1 + k])
             if self._absorption:
                 sent = self._dimmed(sent, ways, sigma)
-            weight *= self._clamp(sent[0] * weight * left_over, depth >= 1)
+            survival *= chance_to_go_on
+            weight *= self._clamp(sent[0] * weight * left_over / survival, bounces >= 1)
             for k, light in enumerate(sent):
                 total[k] += light * weight * left_over
                 if k and self._tangents.entries[k - 1] == self._alpha_entry:
@@ -285,7 +289,10 @@ class TracedPaths:
                 "inside": self._absorption.beyond(s["inside"], si, local, active),
                 "active": active,
             }
-            return after | self._counted(s, kind, pdf_next, after["left"])
+            after |= self._counted(s, kind, pdf_next, after["left"])
+            if self._light_paths is not None:
+                after |= {"survival": mi.Float(survival), "straight_on": passages > s["passages"]}
+            return after
 
         (state,) = dr.while_loop((state,), lambda s: s["active"], lambda s: (body(s),), label="traced paths")
         return state["total"]
@@ -317,6 +324,15 @@ class TracedPaths:
         if self._light_paths is None:
             a, b = dr.square(a), dr.square(b)
         return dr.select(a > 0.0, a / (a + b), 0.0)
+
+    def _survival(self, state: dict[str, Any], bounces: mi.UInt32) -> tuple[mi.Float, mi.Float]:
+        """How many paths Cycles has left before it draws whether one goes on, and the chance that it does."""
+        if self._light_paths is None or self._light_paths.clamp_indirect <= 0.0:
+            return mi.Float(1.0), mi.Float(1.0)
+        fewest, survival = self._light_paths, mi.Float(state["survival"])
+        long_enough = bounces > fewest.min_light_bounces + 1
+        may_end = dr.select(state["straight_on"], state["passages"] > fewest.min_transparent_bounces + 1, long_enough)
+        return survival, continuation(state["beta"][0] / survival, may_end)
 
     def _clamp(self, sample: mi.Color3f, indirect: mi.Bool) -> mi.Float | float:
         """What to scale a sample by whose channels add up to more than Cycles allows."""

@@ -29,8 +29,10 @@ from .shadow_rays import ShadowRays, is_unsampled, sample_light
 from .smooth_facets import TRANSMITS, leaves_on, met_light, seen_side
 
 PLUGIN_NAME = "cycles_path"
+LEAST_CHANCE = 1e-6  # of a path to go on: one that is black by then shows nothing
 CERTAIN = 1e30  # density before the first bounce, and of mirrors
 _LIMITS = ("diffuse_bounces", "glossy_bounces", "transmission_bounces")
+_FEWEST = ("min_light_bounces", "min_transparent_bounces")
 DIFFUSE = mi.BSDFFlags.DiffuseReflection | mi.BSDFFlags.DiffuseTransmission
 
 
@@ -48,6 +50,7 @@ class CyclesPath(RBIntegrator):
         self.camera_world = props.get("camera_world", None)
         self.own_normals = bool(props.get("own_normals", False))
         self.transparent_bounces = int(props.get("transparent_bounces", TRANSPARENT_BOUNCES))
+        self.fewest = tuple(int(props.get(name, 0)) for name in _FEWEST)
         self.limits = tuple(int(props.get(name, NO_LIMIT)) for name in _LIMITS)
 
     @dr.syntax
@@ -89,6 +92,7 @@ class CyclesPath(RBIntegrator):
         previous = dr.zeros(mi.Interaction3f)
         density = mi.Float(1)
         delta = mi.Bool(True)
+        survival, straight_on = mi.Float(1), mi.Bool(False)
         if shadows.lets_through and before is not None:
             # what such a ray meets straight behind a surface is found by the light samples of where it was sent out
             density, delta = mi.Float(0), mi.Bool(False)
@@ -100,6 +104,10 @@ class CyclesPath(RBIntegrator):
         hidden = self.hide_emitters and before is None
 
         while dr.hint(active, label=f"cycles_path ({mode.name})"):
+            chance_to_go_on = mi.Float(1)
+            if dr.hint(self.clamp_indirect > 0.0, mode="scalar"):
+                may_end = dr.select(straight_on, passages > self.fewest[1] + 1, bounce > self.fewest[0] + 1)
+                chance_to_go_on = continuation(first * throughput / survival, may_end)
             straight = mi.Bool(before is None) & (diffuse + glossy + through == 0)
             if dr.hint(known, mode="scalar"):
                 si = met.compute_surface_interaction(ray, mi.RayFlags.All, active)
@@ -136,13 +144,14 @@ class CyclesPath(RBIntegrator):
                 behind_all = straight & seen & ~si.is_valid()
                 emission = dr.select(behind_all, seen_world(self.camera_world, ray.d, behind_all), emission)
             shown = throughput * emission * share(delta, density, light_density)
-            shown *= clamp_factor(self.clamp_indirect, first * shown, bounce >= 2)
+            shown *= clamp_factor(self.clamp_indirect, first * shown / survival, bounce >= 2)
             if dr.hint(lamps, mode="scalar"):
                 likely = dr.select(delta, CERTAIN, density)
                 sent_from = previous.p if shadows.lets_through else None
                 shine = throughput * lamps.met(ray, si, beyond, density=likely, camera=straight, sent_from=sent_from)
-                shown += shine * clamp_factor(self.clamp_indirect, first * shine, bounce >= 2)
+                shown += shine * clamp_factor(self.clamp_indirect, first * shine / survival, bounce >= 2)
 
+            survival *= chance_to_go_on
             goes_on = active & si.is_valid() & ~last
             scatters = goes_on & (left > 1)
             # behind its last bounce a path still goes straight on
@@ -152,7 +161,7 @@ class CyclesPath(RBIntegrator):
                 direct = throughput * of_lamps(
                     scene, shadows, materials, si, on_light, scatters, bounce == 0, passages, inside
                 )
-                direct = direct * clamp_factor(self.clamp_indirect, first * direct, bounce >= 1)
+                direct = direct * clamp_factor(self.clamp_indirect, first * direct / survival, bounce >= 1)
             else:
                 ds, light, _, ways = sample_light(scene, shadows, si, on_light, scatters, None, passages, inside)
                 si.duv_dy = mi.Point2f(dr.select(is_unsampled(ds), 1, 0), 0)
@@ -168,7 +177,7 @@ class CyclesPath(RBIntegrator):
                         value, chance = bsdf.eval_pdf(context, si, si.to_local(ds.d), lit)
                     weight = dr.detach(share(alone(ds), ds.pdf, chance))
                     direct = dr.select(lit, throughput * value * light * weight, 0)
-                    direct = direct * clamp_factor(self.clamp_indirect, first * direct, bounce >= 1)
+                    direct = direct * clamp_factor(self.clamp_indirect, first * direct / survival, bounce >= 1)
 
             u1, u2 = sampler.next_1d(), sampler.next_2d()
             if dr.hint(primal, mode="scalar"):
@@ -209,6 +218,7 @@ class CyclesPath(RBIntegrator):
             sent = counts if shadows.lets_through else goes_on
             left[sent] -= 1
             passages[goes_on & ~counts] += 1
+            straight_on = mi.Bool(is_straight)
             done = (diffuse > self.limits[0]) | (glossy > self.limits[1]) | (through > self.limits[2])
             left = dr.select(done, dr.minimum(left, 1), left)
             least[counts] = dr.minimum(least, dr.select(bs.pdf > 0, bs.pdf, least))
@@ -281,6 +291,14 @@ def least_alpha(filter_glossy: float, density: Any) -> Any:
     return 0.5 * dr.safe_sqrt(1 - density / filter_glossy)
 
 
+def continuation(throughput: Any, ends: Any) -> Any:
+    """How likely Cycles goes on with a path that chance `ends` (`path_state_continuation_probability`).
+
+    What is left is divided by it, and clamped then. No path ends here, and what it shows is as much in the mean.
+    """
+    return dr.select(ends, dr.clip(dr.sqrt(dr.detach(dr.max(dr.abs(throughput)))), LEAST_CHANCE, 1), 1)
+
+
 def clamp_factor(clamp_indirect: float, sample: Any, indirect: Any) -> Any:
     """What to scale a sample of light by, whose channels may add up to too much where it is `indirect`."""
     if clamp_indirect <= 0.0:
@@ -292,7 +310,7 @@ def clamp_factor(clamp_indirect: float, sample: Any, indirect: Any) -> Any:
 
 def light_path_properties(light_paths: LightPaths) -> dict[str, float | int]:
     """Properties of the integrator."""
-    numbers = {name: getattr(light_paths, name) for name in (*_LIMITS, "transparent_bounces")}
+    numbers = {name: getattr(light_paths, name) for name in (*_LIMITS, *_FEWEST, "transparent_bounces")}
     return {"filter_glossy": light_paths.filter_glossy, "clamp_indirect": light_paths.clamp_indirect, **numbers}
 
 

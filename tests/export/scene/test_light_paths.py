@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from typing import Any
 
@@ -78,6 +79,8 @@ def test_what_stays_different_is_said(scene: Any, export: Any) -> None:
         "glossy_bounces": 4,
         "transmission_bounces": 12,
         "transparent_bounces": 8,
+        "min_light_bounces": 0,
+        "min_transparent_bounces": 0,
     }
     assert report.notes == ("Cycles removes caustics; the fit does not.",)
     assert report.request["left_out"] == ["Cycles removes caustics; the fit does not."]
@@ -131,3 +134,29 @@ def test_few_glossy_bounces_are_said(scene: Any, export: Any, glossy: int, total
     scene.cycles.glossy_bounces, scene.cycles.max_bounces = glossy, total
     said = [note for note in export(wall).notes if note.startswith(f"The limit of glossy bounces is {glossy}: ")]
     assert len(said) == is_said
+
+
+@pytest.mark.parametrize("fewest", [0, 8])
+def test_what_chance_leaves_of_dim_paths_is_clamped_as_in_cycles(
+    scene: Any, export: Any, render_cycles: Callable[[], Any], mitsuba: Any, fewest: int
+) -> None:
+    """Light of a dark pit, whose dim paths Cycles ends by chance: those that go on are brighter, and clamped sooner."""
+    scene.render.resolution_x = scene.render.resolution_y = 16
+    cycles = scene.cycles
+    cycles.max_bounces = cycles.diffuse_bounces = 8
+    cycles.samples = 1024
+    dark = diffuse_material("Dark", (0.3, 0.3, 0.3))
+    add_camera("ORTHO", (0, 0, 0.9), (0, 0, 0), ortho_scale=1.6)
+    floor = add_quad("Floor", 2.0, 0.0, new_material("Bottom", Base_Color=(0.3, 0.3, 0.3)))
+    for number in range(4):
+        wall = add_quad(f"Wall {number}", 2.0, 0.0, dark)
+        angle = number * math.pi / 2
+        wall.location, wall.rotation_euler = (math.cos(angle), math.sin(angle), 1.0), (0, -math.pi / 2, angle)
+    add_quad("Lid", 2.0, 2.0, dark)
+    add_light("SPOT", (0, 0, 1.0), (math.pi, 0, 0), energy=100.0, spot_size=0.8, shadow_soft_size=0.01)
+    plain = render_cycles()
+    cycles.sample_clamp_indirect, cycles.min_light_bounces = 0.1, fewest
+    expected = render_cycles()
+    ours = picture_of(export(floor, reference=scene_reference(expected)), rounds=48)
+    assert ours.mean() == pytest.approx(expected.mean(), rel=0.006)  # three deviations of the noise of both
+    assert plain.mean() > 1.5 * expected.mean()

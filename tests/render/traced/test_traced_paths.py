@@ -46,6 +46,16 @@ def test_the_picture_is_that_of_the_path_tracer(tmp_path, light_paths):
     assert np.sqrt(np.mean((got - expected) ** 2) / np.mean(expected**2)) < 0.08  # noise of 1024 paths a pixel
 
 
+@pytest.mark.parametrize("alpha", [1.0, 0.6])
+def test_what_is_clamped_is_that_of_the_path_tracer(tmp_path, alpha):
+    """By so low a bound that it holds most of the light of two bounces and more; behind cut-outs it is still direct."""
+    renderer, paths, pixels = traced(tmp_path, LightPaths(clamp_indirect=0.02))
+    x = renderer.table.pack({**GLASS, "transmission_weight": 0.2, "base_color": (0.3, 0.2, 0.1), "alpha": alpha})
+    got = paths.images(x[None], pixels, seed=1, samples=4096, jacobian=False)[0, :, :, 0]
+    expected = renderer.image(x, seed=7, spp=8192).reshape(-1, 3)[pixels]
+    np.testing.assert_allclose(got.mean(axis=0), expected.mean(axis=0), rtol=0.005)  # 0.011 off with no roulette
+
+
 @pytest.mark.parametrize(("limit", "most"), [(-1, 32), (7, 7), (32, 32), (40, 32)])
 def test_paths_end_where_the_scene_says_and_after_32_surfaces(tmp_path, limit, most):
     assert traced(tmp_path, depth=limit)[1]._depth == most
