@@ -15,6 +15,9 @@ GRID_STEPS = 1 << 16  # across the whole scene; triangles that agree to one of t
 # the axes and turned: the hidden one shows in 50 to 73 % of the pixels at 0, in 4 to 32 % at 1e-7, in at most 0.3 %
 # at 3e-7 and in none at 1e-6. Larger: faces are named that do not show. Smaller: such are not named that do.
 COPLANAR = 3e-7
+# Sine of the angle between two faces that cross and are in no one place, as floor and wall: beside the line where they
+# meet, what is nearer than `COPLANAR` of 10 m to both is 0.3 mm wide then
+CROSSING = 0.01
 CLOSE = 1e-3  # of a triangle's longest side: corners so near are the same where the planes are
 
 
@@ -37,31 +40,41 @@ def shared_faces(places: Sequence[tuple[str, TriangleMesh]]) -> list[tuple[str, 
     return list(dict.fromkeys((places[a][0], places[b][0]) for a, b in pairs))
 
 
-def most_around(points: NDArray[np.float64], reach: NDArray[np.float64], mesh: TriangleMesh) -> int:
-    """In how many triangles of a mesh one of some points (n, 3) lies at most, nearer than its reach (n,) to them."""
+def most_parallel(planes: Sequence[NDArray[np.float64]], others: Sequence[NDArray[np.float64]]) -> int:
+    """How many of the `others` at one of some points lie in the plane of one that is there; each normals (k, 3)."""
+    counts = [
+        np.linalg.norm(np.cross(own[:, None], other[None]), axis=2) for own, other in zip(planes, others, strict=True)
+    ]
+    return max((int(np.count_nonzero((sines < CROSSING).any(axis=0))) for sines in counts), default=0)
+
+
+def normals_around(
+    points: NDArray[np.float64], reach: NDArray[np.float64], mesh: TriangleMesh
+) -> list[NDArray[np.float64]]:
+    """The normals (k, 3) of the triangles of a mesh that each of some points (n, 3) lies in, nearer than its reach."""
+    found = [np.empty((0, 3)) for _ in points]
     margin = reach.max()
     low, high = points.min(axis=0) - margin, points.max(axis=0) + margin
     if (mesh.positions.min(axis=0) > high).any() or (mesh.positions.max(axis=0) < low).any():
-        return 0
+        return found
     near = mesh.triangles
     for axis in range(3):  # one after the other: of a million triangles that takes a tenth of the time
         values = mesh.positions[:, axis][near]
         near = near[(values.min(axis=1) <= high[axis]) & (values.max(axis=1) >= low[axis])]
     corners = mesh.positions[near]
     lowest, highest = (np.ascontiguousarray(ends.T) for ends in (corners.min(axis=1), corners.max(axis=1)))
-    most = 0
-    for point, own in zip(points, reach, strict=True):
+    for number, (point, own) in enumerate(zip(points, reach, strict=True)):
         around = np.flatnonzero((lowest[0] <= point[0] + own) & (highest[0] >= point[0] - own))
         for axis in (1, 2):
             at, to = lowest[axis][around], highest[axis][around]
             around = around[(at <= point[axis] + own) & (to >= point[axis] - own)]
         if len(around):
-            most = max(most, _count_around(corners[around].astype(np.float64), point, own))
-    return most
+            found[number] = _normals_around(corners[around].astype(np.float64), point, own)
+    return found
 
 
-def _count_around(corners: NDArray[np.float64], point: NDArray[np.float64], reach: float) -> int:
-    """How many of some triangles (n, 3, 3) hold a point."""
+def _normals_around(corners: NDArray[np.float64], point: NDArray[np.float64], reach: float) -> NDArray[np.float64]:
+    """The normals (k, 3) of those of some triangles (n, 3, 3) that hold a point."""
     first, second, third = (corners[:, k] for k in range(3))
     normal = np.cross(second - first, third - first)
     area = np.linalg.norm(normal, axis=1)
@@ -72,7 +85,7 @@ def _count_around(corners: NDArray[np.float64], point: NDArray[np.float64], reac
         for a, b in ((first, second), (second, third), (third, first))
     ]
     apart = np.abs(np.einsum("ij,ij->i", point - first, normal))
-    return int(np.count_nonzero((np.min(sides, axis=0) > 0.0) & (apart <= reach)))
+    return normal[(np.min(sides, axis=0) > 0.0) & (apart <= reach)]
 
 
 def _repeated(keys: NDArray[np.int64]) -> NDArray[np.int64]:

@@ -12,7 +12,7 @@ from ..camera.camera_model import Camera
 from ..files.ply_file import TriangleMesh
 from ..findings import Findings
 from ..steps import Pause, Steps
-from .coincident import COPLANAR, most_around
+from .coincident import COPLANAR, most_parallel, normals_around
 from .known_meshes import KnownMeshes
 
 MANY = 100_000  # triangles that windows are drawn before: what is computed with them takes a tenth of a second
@@ -49,7 +49,9 @@ def note_coplanar_faces(
         reach = COPLANAR * (camera.project(points)[1] + np.abs(points).max(axis=1))
         low, high = points.min(axis=0) - reach.max(), points.max(axis=0) + reach.max()
         near = [place for place, (least, most) in zip(filled, bounds, strict=True) if _meet(low, high, least, most)]
-        found = [name for name, mesh in near if most_around(points, reach, mesh) > (name == own)]
+        around = [(name, normals_around(points, reach, mesh)) for name, mesh in near]
+        planes = [np.concatenate([*each]) for each in zip(*(n for name, n in around if name == own), strict=True)]
+        found = [name for name, normals in around if most_parallel(planes or normals, normals) > (name == own)]
         for other in dict.fromkeys(found):
             if other == own:
                 findings.note(_twice(own))

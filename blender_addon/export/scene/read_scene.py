@@ -164,7 +164,6 @@ def _read(
                 findings.take_over(of_one, (each.object.name, each.slot))
         if not all(pieces):
             return None
-        of_others = met_points(data, scene, depsgraph)
         for number, each in enumerate(fitted):
             of_one = Findings()
             seen = check_visible(data, pieces[number], each.object, each.slot, scene, depsgraph, of_one)
@@ -173,7 +172,8 @@ def _read(
                 data.unseen[number] = of_one.errors[0]
                 if not may_miss:
                     findings.error(of_one.errors[0], *of_one.fixes[of_one.errors[0]])
-        walk.seen = of_others | walk.seen
+        for name, points in met_points(data, scene, depsgraph).items():
+            walk.seen[name] = np.concatenate([walk.seen.get(name, points[:0]), points])
     return walk
 
 

@@ -23,6 +23,7 @@ PROBES = 2000
 MET = 1e-4  # of a ray's length: it has met a point that it was aimed at; Blender's rays are single precision
 MOST_SEEN = 200  # points of the target, of those that a ray meets, are looked for
 RAYS = 12  # along each side of the frame, where it is looked for what lies in one plane
+MOST_BEHIND = 8  # surfaces on such a ray: two walls of a bottle, a drink in it, and what it stands on
 OUTSIDE = "The camera does not see '{obj}': move it into the frame."
 
 
@@ -91,7 +92,7 @@ def say_no_faces(fitted: FittedSlot, view_layer: bpy.types.ViewLayer, left_out: 
 def met_points(
     data: SceneData, scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph
 ) -> dict[str, NDArray[np.float64]]:
-    """Points (n, 3) where rays all over the frame first meet each object, by its name."""
+    """Points (n, 3) where rays all over the frame meet each object, by its name, also those behind what is clear."""
     corners = np.array([scene.camera.matrix_world @ corner for corner in scene.camera.data.view_frame(scene=scene)])
     world, found = data.camera.world, dict[str, list[NDArray[np.float64]]]()
     forward, eye = -world[:3, 2], data.origin + world[:3, 3]
@@ -102,9 +103,14 @@ def met_points(
         direction = forward if is_flat else place - eye
         start = place - forward * (forward @ (place - eye)) if is_flat else eye
         start = start + direction * (data.camera.clip_start / float(direction @ forward))
-        hit, at, _, _, item, _ = scene.ray_cast(depsgraph, Vector(start), Vector(direction))
-        if hit:
+        for _ in range(MOST_BEHIND):
+            hit, at, _, _, item, _ = scene.ray_cast(depsgraph, Vector(start), Vector(direction))
+            if not hit:
+                break
             found.setdefault(item.name, []).append(np.array(at) - data.origin)
+            if not _lets_light_through(item):
+                break
+            start = np.array(at) + MET * direction
     return {name: np.array(points) for name, points in found.items()}
 
 

@@ -11,9 +11,9 @@ import pytest
 
 from blender_addon.export.files.ply_file import TriangleMesh
 from blender_addon.export.job import check_export
-from blender_addon.export.meshes.coincident import most_around, shared_faces
+from blender_addon.export.meshes.coincident import most_parallel, normals_around, shared_faces
 
-from ..scenes import add_camera, add_light, add_mesh, new_material
+from ..scenes import add_camera, add_light, add_mesh, add_quad, new_material
 
 
 def mesh(corners: Any) -> TriangleMesh:
@@ -78,7 +78,7 @@ def test_points_lie_in_faces_where_they_are_inside_them_and_in_their_plane() -> 
     faces = mesh([FACE, FACE + np.array([5, 0, 1]), 0 * FACE, 2 * FACE - np.array([0.1, 0.1, 0])])
 
     def count(*point: float, reach: float = 1e-6) -> int:
-        return most_around(np.array([point, (9.0, 9.0, 9.0)]), np.full(2, reach), faces)
+        return max(map(len, normals_around(np.array([point, (9.0, 9.0, 9.0)]), np.full(2, reach), faces)))
 
     assert count(0.3, 0.3, 0.0) == 2
     assert count(5.3, 0.3, 1.0) == 1
@@ -90,7 +90,46 @@ def test_points_lie_in_faces_where_they_are_inside_them_and_in_their_plane() -> 
     weights = np.random.default_rng(3).dirichlet([1.0, 1.0, 1.0], 20)
     outside = weights + np.array([-1.01, 0.0, 1.01])
     for shares, wanted in ((weights, 1), (outside, 0)):
-        assert [most_around(w[None] @ turned, np.array([1e-6]), mesh([turned])) for w in shares] == [wanted] * 20
+        assert [len(*normals_around(w[None] @ turned, np.array([1e-6]), mesh([turned]))) for w in shares] == [
+            wanted
+        ] * 20
+
+
+def test_faces_that_cross_are_in_no_one_place() -> None:
+    up, aslant = np.array([[0.0, 0.0, 1.0]]), np.array([[0.1, 0.0, 0.995]])
+    assert most_parallel([up], [-up]) == 1
+    assert most_parallel([up], [np.concatenate([aslant, up, up])]) == 2
+    assert most_parallel([up, aslant], [aslant, up]) == 0
+    assert most_parallel([up], [np.empty((0, 3))]) == 0
+
+
+def test_a_wall_that_goes_through_a_floor_is_not_named(scene: Any) -> None:
+    """The camera looks along the line where they meet, with a row of rays on it."""
+    floor = add_quad("Floor", 4.0, 0.0, new_material("Target"))
+    add_quad("Wall", 4.0, 0.0, new_material("Wall")).rotation_euler = (np.pi / 2, 0, 0)
+    add_light("POINT", (3, -3, 3), energy=300.0)
+    add_camera("ORTHO", (0, -5, 5), rotation=(np.pi / 4, 0, 0), ortho_scale=2.4, shift_y=1 / 24)
+    assert not any("in the same place" in note for note in check_export(bpy.context, floor)[1])
+    add_quad("Rug", 1.0, 0.0, new_material("Rug"))
+    assert any("'Floor' and 'Rug' have faces in the same" in note for note in check_export(bpy.context, floor)[1])
+
+
+@pytest.mark.parametrize(("lift", "named"), [(0.0, True), (0.001, False)])
+@pytest.mark.parametrize("is_target", [True, False])
+def test_what_a_glass_stands_on_is_seen_through_it(scene: Any, lift: float, named: bool, is_target: bool) -> None:
+    """Its bottom lies in the plane of the table, which Cycles has black there; that of an opaque block nobody sees."""
+    table = add_quad("Table", 4.0, 0.0, new_material("Table"))
+    bpy.ops.mesh.primitive_cube_add(size=1.0, location=(0.3, 0.2, 0.5 + lift))
+    block = bpy.context.object
+    add_light("POINT", (3, -3, 3), energy=300.0)
+    add_camera("ORTHO", (0, -5, 5), rotation=(np.pi / 4, 0, 0), ortho_scale=2.4)
+    for transmission in (0.0, 1.0):
+        block.data.materials.clear()
+        block.data.materials.append(new_material("Block", Transmission_Weight=transmission))
+        notes = check_export(bpy.context, block if is_target else table)[1]
+        assert any("'Cube'" in n and "'Table'" in n and "same place" in n for n in notes) == (
+            transmission > 0 and named
+        )
 
 
 def test_faces_of_the_target_in_a_larger_one_of_its_own_are_named(scene: Any) -> None:

@@ -1,0 +1,38 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Surfaces a tenth of a millimetre apart, of which the first lets light through. Oracle: Cycles' render."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+import pytest
+
+from ..scene.test_light_paths import picture_of, scene_reference
+from ..scenes import add_camera, add_quad, diffuse_material, new_material, world_color
+
+KINDS = {
+    "cut-out": {"Base_Color": (0.8, 0.3, 0.1), "Alpha": 0.4},
+    "glass": {"Base_Color": (0.9, 0.9, 0.9), "Transmission_Weight": 1.0, "Roughness": 0.0, "IOR": 1.0},
+}
+
+
+@pytest.mark.parametrize("gap", [1e-4, 2e-5])
+@pytest.mark.parametrize("kind", KINDS)
+def test_what_lies_close_below_is_seen_and_lit(
+    scene: Any, export: Any, render_cycles: Callable[[], Any], mitsuba: Any, kind: str, gap: float
+) -> None:
+    """A decal on a box, a label behind glass: both seen from above, under a sky, a metre from zero."""
+    scene.render.resolution_x = scene.render.resolution_y = 16
+    cycles = scene.cycles
+    cycles.max_bounces = cycles.diffuse_bounces = cycles.transmission_bounces = 4
+    cycles.samples = 512
+    world_color(scene, 0.4)
+    add_camera("ORTHO", (0, 0, 5), ortho_scale=1.0)
+    below = add_quad("Below", 2.0, 1.0, new_material("Below", Base_Color=(0.2, 0.5, 0.7), Roughness=0.8))
+    add_quad("Floor", 4.0, 0.0, diffuse_material("Floor", (0.05, 0.05, 0.05)))
+    add_quad("Above", 0.6, 1.0 + gap, new_material("Above", **KINDS[kind]))
+    expected = render_cycles()
+    ours = picture_of(export(below, reference=scene_reference(expected)), rounds=16)
+    np.testing.assert_allclose(ours.mean(axis=(0, 1)), expected.mean(axis=(0, 1)), rtol=0.005)
