@@ -206,16 +206,19 @@ class _Met:
 def _upstream(socket: bpy.types.NodeSocket, groups: tuple[bpy.types.Node, ...], links: Links) -> Iterator[_Met]:
     """The values upstream of a socket that lies in `groups`."""
     seen: set[tuple[Any, ...]] = set()
-    ways = [(iter([(socket, groups)]), False)]
+    ways: list[tuple[Iterator[Any], bool, bpy.types.NodeSocket | None]] = [(iter([(socket, groups)]), False, None)]
     while ways:
-        further, within = next(ways[-1][0], (None, ()))
+        sockets, was_direction, inner = ways[-1]
+        further, within = next(sockets, (None, ()))
         if further is None:
             ways.pop()
             continue
-        is_direction = ways[-1][1] or (further.node.bl_idname, further.name) == ranges.DIRECTION
+        if further.node.bl_idname != GROUP:
+            inner = further  # what an input of a group stands for
+        is_direction = was_direction or (further.node.bl_idname, further.name) == ranges.DIRECTION
         if not further.is_linked:
             if further.node.bl_idname != GROUP_INPUT and not is_tint(further.node):  # a tint has names of its own
-                yield from _as_direction(_input_values(further, within), is_direction)
+                yield from _as_direction(_input_values(further, within, inner or further), is_direction)
         elif (source := source_of(further, links)) is not None and not source.node.mute:
             node = source.node
             key = (*(group.as_pointer() for group in within), node.as_pointer(), source.identifier)
@@ -224,7 +227,7 @@ def _upstream(socket: bpy.types.NodeSocket, groups: tuple[bpy.types.Node, ...], 
             seen.add(key)
             if node.bl_idname not in (GROUP, GROUP_INPUT):
                 yield from _as_direction(_own_values(node, within, source), is_direction)
-            ways.append((feeding(node, source, within), is_direction))
+            ways.append((feeding(node, source, within), is_direction, inner if node.bl_idname == GROUP_INPUT else None))
 
 
 def _as_direction(values: Iterable[_Met], is_direction: bool) -> Iterator[_Met]:
@@ -249,7 +252,10 @@ def _path(node: bpy.types.Node, groups: tuple[bpy.types.Node, ...]) -> tuple[str
     return (*(group.name for group in groups), node.name)
 
 
-def _input_values(socket: bpy.types.NodeSocket, groups: tuple[bpy.types.Node, ...]) -> Iterator[_Met]:
+def _input_values(
+    socket: bpy.types.NodeSocket, groups: tuple[bpy.types.Node, ...], inner: bpy.types.NodeSocket
+) -> Iterator[_Met]:
+    """The values of a socket; `inner` is the one inside of a group which it is an input of, or itself."""
     node = socket.node
     if not socket.enabled or socket.hide_value or getattr(socket, "is_unavailable", False):
         return
@@ -261,7 +267,10 @@ def _input_values(socket: bpy.types.NodeSocket, groups: tuple[bpy.types.Node, ..
     if socket.type == "RGBA":
         yield _Met(place, node, groups, name, True, Range(0.0, 1.0, COLOR), [])
     elif socket.type == "VALUE":
-        yield _Met(place, node, groups, name, False, range_of_input(node, socket, socket.default_value), [])
+        limits = range_of_input(inner.node, inner, socket.default_value)
+        if limits.group == NUMBER and not limits.scanned:  # nothing is known of it by what it feeds
+            limits = range_of_input(node, socket, socket.default_value)
+        yield _Met(place, node, groups, name, False, limits, [])
     elif socket.type == "VECTOR":
         for k, number in enumerate(socket.default_value):
             axis = replace(place, component=k)
