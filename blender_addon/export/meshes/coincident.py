@@ -18,6 +18,8 @@ COPLANAR = 3e-7
 # Sine of the angle between two faces that cross and are in no one place, as floor and wall: beside the line where they
 # meet, what is nearer than `COPLANAR` of 10 m to both is 0.3 mm wide then
 CROSSING = 0.01
+# Of a triangle: a point so near to an edge may lie in both that meet there, by what floats leave. No measurement
+BESIDE_EDGES = 1e-4
 CLOSE = 1e-3  # of a triangle's longest side: corners so near are the same where the planes are
 
 
@@ -85,7 +87,7 @@ def _normals_around(corners: NDArray[np.float64], point: NDArray[np.float64], re
         for a, b in ((first, second), (second, third), (third, first))
     ]
     apart = np.abs(np.einsum("ij,ij->i", point - first, normal))
-    return normal[(np.min(sides, axis=0) > 0.0) & (apart <= reach)]
+    return normal[(np.min(sides, axis=0) > BESIDE_EDGES * area) & (apart <= reach)]
 
 
 def _repeated(keys: NDArray[np.int64]) -> NDArray[np.int64]:

@@ -23,8 +23,8 @@ import numpy as np
 
 from ...material.arrays.own_memory import own_memory
 from .absorption import Absorption, Inside
-from .ray_starts import RayStarts
-from .smooth_facets import TRANSMITS, ShadowTerminator, follows_cycles, leaves_on, shape_number, shape_table
+from .ray_starts import RayStarts, lets_through
+from .smooth_facets import TRANSMITS, ShadowTerminator, leaves_on, shape_number, shape_table
 
 SHADOW_TRANSMISSION = "shadow_transmission"
 UNIFORM = "ConstantBackgroundEmitter"  # Mitsuba's class of the plugin `constant`
@@ -55,9 +55,7 @@ class ShadowRays:
         self._marks = shape_table(marked, values, mi.Float) if marked else own_memory(np.zeros(1, np.float32), mi.Float)
         # surfaces that light goes straight through; Mitsuba's integrators block all light
         self.most = int(getattr(scene.integrator(), "transparent_bounces", 0))
-        self.lets_through = follows_cycles(scene) and any(
-            s.bsdf() is not None and mi.has_flag(s.bsdf().flags(), mi.BSDFFlags.Null) for s in scene.shapes()
-        )
+        self.lets_through = lets_through(scene, mi.BSDFFlags.Null)
 
     def passed(
         self,

@@ -42,7 +42,8 @@ def placed(kind: str, at: list[float], size: float) -> dict[str, Any]:
 def test_rays_do_not_meet_what_they_leave(integrator: dict[str, Any], kind: str, size: float, away: float) -> None:
     from mfo_backend.render.transport.ray_starts import RayStarts
 
-    scene = loaded(**integrator, shape=placed(kind, [away, away, 0.1 * away], size))
+    clear = {"bsdf": {"type": "null"}} if integrator else {}  # where rays start nearer
+    scene = loaded(**integrator, shape=placed(kind, [away, away, 0.1 * away], size) | clear)
     sampler = mi.load_dict({"type": "independent"})
     sampler.seed(1, COUNT)
     there = scene.shapes()[0].sample_position(0.0, sampler.next_2d())
