@@ -206,7 +206,7 @@ class _Met:
 def _upstream(socket: bpy.types.NodeSocket, groups: tuple[bpy.types.Node, ...], links: Links) -> Iterator[_Met]:
     """The values upstream of a socket that lies in `groups`."""
     seen: set[tuple[Any, ...]] = set()
-    ways: list[tuple[Iterator[Any], bool, bpy.types.NodeSocket | None]] = [(iter([(socket, groups)]), False, None)]
+    ways: list[tuple[Iterator[Any], bool, bpy.types.NodeSocket]] = [(iter([(socket, groups)]), False, socket)]
     while ways:
         sockets, was_direction, inner = ways[-1]
         further, within = next(sockets, (None, ()))
@@ -218,7 +218,7 @@ def _upstream(socket: bpy.types.NodeSocket, groups: tuple[bpy.types.Node, ...], 
         is_direction = was_direction or (further.node.bl_idname, further.name) == ranges.DIRECTION
         if not further.is_linked:
             if further.node.bl_idname != GROUP_INPUT and not is_tint(further.node):  # a tint has names of its own
-                yield from _as_direction(_input_values(further, within, inner or further), is_direction)
+                yield from _as_direction(_input_values(further, within, inner), is_direction)
         elif (source := source_of(further, links)) is not None and not source.node.mute:
             node = source.node
             key = (*(group.as_pointer() for group in within), node.as_pointer(), source.identifier)
@@ -227,7 +227,7 @@ def _upstream(socket: bpy.types.NodeSocket, groups: tuple[bpy.types.Node, ...], 
             seen.add(key)
             if node.bl_idname not in (GROUP, GROUP_INPUT):
                 yield from _as_direction(_own_values(node, within, source), is_direction)
-            ways.append((feeding(node, source, within), is_direction, inner if node.bl_idname == GROUP_INPUT else None))
+            ways.append((feeding(node, source, within), is_direction, inner))
 
 
 def _as_direction(values: Iterable[_Met], is_direction: bool) -> Iterator[_Met]:

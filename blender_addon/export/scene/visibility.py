@@ -23,6 +23,9 @@ PROBES = 2000
 MET = 1e-4  # of a ray's length: it has met a point that it was aimed at; Blender's rays are single precision
 MOST_SEEN = 200  # points of the target, of those that a ray meets, are looked for
 RAYS = 12  # along each side of the frame, where it is looked for what lies in one plane
+# Of a ray's length, some ten steps of a float: what it meets next lies further behind. With `MET` rays began within a
+# box of which a decal lay 0.05 mm above, and met the floor that it stands on
+BEHIND = 1e-6
 MOST_BEHIND = 8  # surfaces on such a ray: two walls of a bottle, a drink in it, and what it stands on
 OUTSIDE = "The camera does not see '{obj}': move it into the frame."
 
@@ -103,6 +106,7 @@ def met_points(
         direction = forward if is_flat else place - eye
         start = place - forward * (forward @ (place - eye)) if is_flat else eye
         start = start + direction * (data.camera.clip_start / float(direction @ forward))
+        begin = start
         for _ in range(MOST_BEHIND):
             hit, at, _, _, item, _ = scene.ray_cast(depsgraph, Vector(start), Vector(direction))
             if not hit:
@@ -110,7 +114,7 @@ def met_points(
             found.setdefault(item.name, []).append(np.array(at) - data.origin)
             if not _lets_light_through(item):
                 break
-            start = np.array(at) + MET * direction
+            start = begin + (1.0 + BEHIND) * (np.array(at) - begin)
     return {name: np.array(points) for name, points in found.items()}
 
 

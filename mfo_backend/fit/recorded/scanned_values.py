@@ -42,7 +42,10 @@ def best_scanned(setting: Setting, recording: Recording) -> list[Placed]:
     groups = recording.paths.pixel_groups(recording.paths.interior)
     groups = fewer_groups(groups, setting.calm, setting.plan.start_lanes)
     reference = groups.average(setting.calm)
-    image, dark = (setting.scene.images_of(recording.paths, groups, x) for x in (setting.user, _dark(setting)))
+    image = setting.scene.images_of(recording.paths, groups, setting.user)
+    dark = None
+    if any(_own_name(name) in DIRECTIONS.values() for name in graph.varying):
+        dark = setting.scene.images_of(recording.paths, groups, _dark(setting))
     best: list[Placed] = [{}]
     for entry in (first + j for j in graph.scanned):
         lower, upper = setting.table.lower[entry], setting.table.upper[entry]
@@ -63,10 +66,10 @@ def _dark(setting: Setting) -> Vector:
     return vector
 
 
-def _mixed(pictures: Pictures, image: ImageOf, dark: ImageOf) -> NDArray[np.float32]:
+def _mixed(pictures: Pictures, image: ImageOf, dark: ImageOf | None) -> NDArray[np.float32]:
     """Images (g, 3, n) whose best mix is nearly the picture of a material in any colours.
 
-    A pattern of colours is mixed with none at two levels, one of normals with what it mirrors alone.
+    A pattern of colours is mixed with none at two levels, one of normals with what it mirrors alone, which is `dark`.
     """
     turned = {name: picture for name, picture in pictures.items() if _own_name(name) in DIRECTIONS.values()}
     colors = {name: picture for name, picture in pictures.items() if name not in turned}
@@ -75,7 +78,7 @@ def _mixed(pictures: Pictures, image: ImageOf, dark: ImageOf) -> NDArray[np.floa
         flat = {name: np.repeat(picture[-1:], len(picture), axis=0) for name, picture in colors.items()}
         half = {name: np.float32(0.5) * picture for name, picture in flat.items()}
         images += [image({**turned, **flat}), image({**turned, **half})]
-    if turned:
+    if dark is not None:
         black = {name: 0.0 * picture for name, picture in colors.items() if _own_name(name) == COLOR}
         images.append(dark({**pictures, **black}))
     return np.stack(images, axis=-1)

@@ -30,7 +30,7 @@ from ..pictures.mitsuba_renderer import MitsubaRenderer
 from ..pictures.pass_counter import with_derivatives
 from ..random_numbers.path_random import PathRandom
 from ..transport.camera_view import CameraView
-from ..transport.cycles_path import DIFFUSE, continuation, seen_world
+from ..transport.cycles_path import DIFFUSE, continuation, is_beyond, seen_world
 from ..transport.shadow_rays import ShadowRays, is_unsampled, left_of, sample_light
 from ..transport.smooth_facets import TRANSMITS, leaves_on, met_light, seen_side
 from .traced_target import TracedTarget
@@ -329,9 +329,9 @@ class TracedPaths:
         """How many paths Cycles has left before it draws whether one goes on, and the chance that it does."""
         if self._light_paths is None or self._light_paths.clamp_indirect <= 0.0:
             return mi.Float(1.0), mi.Float(1.0)
-        fewest, survival = self._light_paths, mi.Float(state["survival"])
-        long_enough = bounces > fewest.min_light_bounces + 1
-        may_end = dr.select(state["straight_on"], state["passages"] > fewest.min_transparent_bounces + 1, long_enough)
+        fewest = self._light_paths.min_light_bounces, self._light_paths.min_transparent_bounces
+        survival = mi.Float(state["survival"])
+        may_end = is_beyond(fewest, bounces, state["passages"], state["straight_on"])
         return survival, continuation(state["beta"][0] / survival, may_end)
 
     def _clamp(self, sample: mi.Color3f, indirect: mi.Bool) -> mi.Float | float:

@@ -29,7 +29,7 @@ from .shadow_rays import ShadowRays, is_unsampled, sample_light
 from .smooth_facets import TRANSMITS, leaves_on, met_light, seen_side
 
 PLUGIN_NAME = "cycles_path"
-LEAST_CHANCE = 1e-6  # of a path to go on: one that is black by then shows nothing
+LEAST_CHANCE = 1e-6  # of a path to go on, for a division: one that is black by then shows nothing. No measurement
 CERTAIN = 1e30  # density before the first bounce, and of mirrors
 _LIMITS = ("diffuse_bounces", "glossy_bounces", "transmission_bounces")
 _FEWEST = ("min_light_bounces", "min_transparent_bounces")
@@ -106,8 +106,8 @@ class CyclesPath(RBIntegrator):
         while dr.hint(active, label=f"cycles_path ({mode.name})"):
             chance_to_go_on = mi.Float(1)
             if dr.hint(self.clamp_indirect > 0.0, mode="scalar"):
-                may_end = dr.select(straight_on, passages > self.fewest[1] + 1, bounce > self.fewest[0] + 1)
-                chance_to_go_on = continuation(first * throughput / survival, may_end)
+                beyond_fewest = is_beyond(self.fewest, bounce, passages, straight_on)
+                chance_to_go_on = continuation(first * throughput / survival, beyond_fewest)
             straight = mi.Bool(before is None) & (diffuse + glossy + through == 0)
             if dr.hint(known, mode="scalar"):
                 si = met.compute_surface_interaction(ray, mi.RayFlags.All, active)
@@ -289,6 +289,11 @@ def least_alpha(filter_glossy: float, density: Any) -> Any:
     if filter_glossy <= 0.0:
         return mi.Float(0)
     return 0.5 * dr.safe_sqrt(1 - density / filter_glossy)
+
+
+def is_beyond(fewest: tuple[int, int], bounces: Any, passages: Any, straight_on: Any) -> Any:
+    """Whether chance may end a path in Cycles: after the `fewest` bounces, or passages where it comes `straight_on`."""
+    return dr.select(straight_on, passages > fewest[1] + 1, bounces > fewest[0] + 1)
 
 
 def continuation(throughput: Any, ends: Any) -> Any:

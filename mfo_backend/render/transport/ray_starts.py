@@ -25,12 +25,9 @@ MITSUBA = 1500.0 * 2.0**-24  # half steps of a float at 1 (mitsuba/core/math.h, 
 # Of two million rays that leave or pass a square, at any angle, none meets it again for sides of 1 m to 200 m, up to
 # 100 m from zero, alone and as an instance, and 10 for one of 1 km; with 40 half steps it is 100, and 2,281 for 10 km
 EPSILON = 75.0 * 2.0**-24
-# Of the way to a light, as Mitsuba's; but no more than ten `EPSILON` at the light. With Mitsuba's alone light of a ball
-# went past a film of 0.5 mm around it: a floor was 0.9 % too bright
-SHADOW_EPSILON = 10.0 * MITSUBA
-# Where all is opaque nothing shows what lies so near, and rays start as before: with `EPSILON` a floor and a wall that
-# are fitted together ended at twice the difference from their reference, which was not explained
-CLEAR = mi.BSDFFlags.Null | mi.BSDFFlags.Transmission
+# A ray to a light ends so many times what it starts above a surface before it, as Mitsuba's: there it is a share of the
+# way. With that share alone light of a ball went past a film of 0.5 mm around it: a floor was 0.9 % too bright
+BEFORE_LIGHT = 10.0
 # Metres: shapes that reach no further from zero are small. Rays start as many steps of a float above them as at 1 m.
 # With Mitsuba's a scene of millimetres was 0.83 % darker than in Cycles and one of centimetres 0.12 %; both were within
 # 0.02 % (docs/notebook/differential.md)
@@ -45,7 +42,8 @@ class RayStarts:
         boxes = [shape.bbox() for shape in shapes]
         reach = [float(np.max(np.abs([np.ravel(box.min), np.ravel(box.max)]))) for box in boxes]
         small = [(shape, far) for shape, far in zip(shapes, reach, strict=True) if 0.0 < far <= SMALL]
-        self._epsilon = EPSILON if lets_through(scene, CLEAR) else MITSUBA
+        # where all is opaque nothing shows what lies so near
+        self._epsilon = EPSILON if lets_through(scene, mi.BSDFFlags.Transmission) else MITSUBA
         self._reach = shape_table(*map(list, zip(*small, strict=True)), mi.Float) if small else None
 
     def ray(self, si: mi.SurfaceInteraction3f, direction: mi.Vector3f) -> mi.Ray3f:
@@ -58,9 +56,9 @@ class RayStarts:
         start = self._start(si, point, end - point)
         way = end - start
         far = dr.norm(way)
-        before = 10.0 * self._epsilon * (1.0 + dr.maximum(dr.max(dr.abs(end)), far))
-        ends = far - dr.minimum(SHADOW_EPSILON * far, before)
-        return mi.Ray3f(start, way / far, ends, si.time, si.wavelengths)
+        near = self._epsilon * (1.0 + dr.maximum(dr.max(dr.abs(end)), far))
+        before = BEFORE_LIGHT * dr.minimum(MITSUBA * far, near)
+        return mi.Ray3f(start, way / far, far - before, si.time, si.wavelengths)
 
     def _start(self, si: mi.SurfaceInteraction3f, point: mi.Point3f, direction: mi.Vector3f) -> mi.Point3f:
         size = 1.0 + dr.max(dr.abs(point))

@@ -98,25 +98,6 @@ def test_a_colour_that_is_a_direction_is_no_value(graph: SimpleNamespace) -> Non
     assert set(paint.sockets) == {"Base Color", "Normal"}  # here it is a colour, too
 
 
-def test_an_input_of_a_group_is_what_it_feeds_inside(graph: SimpleNamespace) -> None:
-    """Through two groups: the strength of a bump is a setting from 0 to 1 that is scanned, whatever its name there."""
-    outer, inner = (graph.bpy.data.node_groups.new(name, "ShaderNodeTree") for name in ("Outer", "Inner"))
-    for tree in (outer, inner):
-        tree.interface.new_socket("Dents", in_out="INPUT", socket_type="NodeSocketFloat")
-        tree.interface.new_socket("Normal", in_out="OUTPUT", socket_type="NodeSocketVector")
-    nodes = [inner.nodes.new("ShaderNodeBump"), outer.nodes.new("ShaderNodeGroup")]
-    nodes[1].node_tree = inner
-    for tree, node in zip((inner, outer), nodes, strict=True):
-        tree.links.new(tree.nodes.new("NodeGroupInput").outputs[0], node.inputs[0])
-        tree.links.new(node.outputs[0], tree.nodes.new("NodeGroupOutput").inputs[0])
-    node = graph.material.node_tree.nodes.new("ShaderNodeGroup")
-    node.node_tree, node.label = outer, "Finish"
-    node.inputs["Dents"].default_value = 0.2
-    graph.material.node_tree.links.new(node.outputs[0], graph.shader.inputs["Normal"])
-    dents = values_of(graph.material)["Finish/Dents"].range
-    assert (dents.lower, dents.upper, dents.group, dents.scanned) == (0.0, 1.0, "setting", True)
-
-
 def test_sets_and_names(graph: SimpleNamespace) -> None:
     from blender_addon.export.nodes.target_shader import target_shader
     from blender_addon.graph_values.mix_values import default_values

@@ -43,7 +43,9 @@ class Fake:
         self.recording: Any = SimpleNamespace(
             paths=SimpleNamespace(pixel_groups=lambda keep: groups, interior=None), setting=None
         )
-        graph = SimpleNamespace(scanned=(0,), table=values, plain=lambda vectors: [self.pictures(v) for v in vectors])
+        varying = dict.fromkeys(self.pictures(values.pack({})), (0,))
+        plain = lambda vectors: [self.pictures(v) for v in vectors]  # noqa: E731
+        graph = SimpleNamespace(scanned=(0,), table=values, varying=varying, plain=plain)
         scene = SimpleNamespace(graph=graph, images_of=lambda paths, groups, vector: partial(self.image, vector))
         course = SimpleNamespace(should_stop=lambda: False)
         self.setting: Any = SimpleNamespace(
