@@ -162,3 +162,18 @@ def test_an_object_in_the_plane_of_the_target_is_named_where_it_is_seen(gap: flo
     bpy.context.view_layer.update()
     said = [note for note in check_export(bpy.context, item)[1] if "in the same place" in note]
     assert [note[:40] for note in said] == (["'Cube' and 'Text' have faces in the same"] if is_named else [])
+
+
+def test_what_a_box_below_a_close_decal_stands_on_is_not_seen(scene: Any) -> None:
+    """A ray that went on within the box met its foot, and the floor in the same plane."""
+    bpy.ops.mesh.primitive_plane_add(size=20.0)
+    bpy.context.object.data.materials.append(new_material("Floor"))
+    bpy.ops.mesh.primitive_cube_add(size=2.0, location=(0.0, 0.0, 1.0))
+    box = bpy.context.object
+    box.data.materials.append(new_material("Target"))
+    bpy.ops.mesh.primitive_plane_add(size=1.5, location=(0.0, -1.0 - 5e-5, 1.0), rotation=(np.pi / 2, 0, 0))
+    bpy.context.object.data.materials.append(new_material("Decal", Alpha=0.5))
+    add_light("POINT", (3, -3, 3), energy=300.0)
+    add_camera("PERSP", (0.0, -5.0, 4.0), rotation=(np.radians(55), 0, 0))
+    bpy.context.view_layer.update()
+    assert not any("in the same place" in note for note in check_export(bpy.context, box)[1])

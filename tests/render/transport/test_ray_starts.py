@@ -134,3 +134,17 @@ def test_rays_meet_what_a_decal_lies_on(gap: float, away: float) -> None:
     behind = scene.ray_intersect(RayStarts(scene).ray(si, down))
     assert np.all(behind.is_valid())
     assert abs(np.array(behind.p)[2, 0]) < 0.1 * gap
+
+
+def test_rays_to_a_light_meet_a_film_just_before_it() -> None:
+    """Half a millimetre before it on a way of two metres, of which Mitsuba leaves out 1.8 mm."""
+    from mfo_backend.render.transport.ray_starts import RayStarts
+
+    film = {
+        "type": "rectangle",
+        "to_world": mi.ScalarTransform4f().translate([0.0, 0.0, 2.0 - 5e-4]),
+        "bsdf": {"type": "null"},
+    }
+    scene = loaded(**CYCLES, floor={"type": "rectangle"}, film=film)
+    si = scene.ray_intersect(mi.Ray3f(mi.Point3f(0.1, 0.2, 1.0), mi.Vector3f(0.0, 0.0, -1.0)))
+    assert np.all(scene.ray_test(RayStarts(scene).ray_to(si, mi.Point3f(0.1, 0.2, 2.0))))
