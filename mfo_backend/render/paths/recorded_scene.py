@@ -318,12 +318,13 @@ class RecordedScene:
         self, paths: RecordedPaths, groups: LaneGroups, vector: NDArray[np.float64]
     ) -> Callable[[Mapping[str, NDArray[np.float32]]], NDArray[np.float32]]:
         """The function from flat pictures of a graph to the image (g, 3) of the groups, all else as in `vector`."""
-        constant = groups.average(paths.constant)
+        constant, varying = groups.average(paths.constant), self._evaluated
+        assert varying is not None
         lanes, cost = Lanes.as_recorded(paths, groups, self._held), self._share(groups)
 
         def at(pictures: Mapping[str, NDArray[np.float32]]) -> NDArray[np.float32]:
             self.renderer.counter.add(cost)
-            samples = self._image(vector, lanes, groups, VaryingValues.plain_arrays(pictures))
+            samples = self._image(vector, lanes, groups, varying.plain_arrays(pictures))
             return TwoSamples.of(samples, constant).mean[:, :, 0]
 
         return at

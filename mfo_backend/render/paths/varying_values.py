@@ -57,10 +57,9 @@ class VaryingValues:
             self._surface = SeenSurface(*self._graph.seen(vector[self.first :]))
         return self._surface
 
-    @staticmethod
-    def plain_arrays(pictures: Mapping[str, NDArray[np.float32]]) -> tuple[Any, ...]:
-        """Flat pictures without slopes."""
-        flat = tuple(own_memory(picture, mi.Float) for picture in pictures.values())
+    def plain_arrays(self, pictures: Mapping[str, NDArray[np.float32]]) -> tuple[Any, ...]:
+        """Flat pictures without slopes, in the order in which kernels read them."""
+        flat = tuple(own_memory(pictures[name], mi.Float) for name in self.names)
         dr.eval(flat)
         return flat
 
