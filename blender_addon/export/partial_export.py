@@ -151,7 +151,8 @@ def partial_export(
                 request_of(context, each, data.materials[target_bsdf(k)], own.values, region, data.origin)
                 for k, (each, own) in enumerate(zip(fitted, wanted, strict=True))
             ]
-            if any(inside) and is_first:  # all pictures are evaluated in its copy, as it was read
+            # all pictures are evaluated in the first one's copy, as it was read
+            if any("values" in own for own in inside) and is_first:
                 write_copy(folder / GRAPH_FOLDER)
             yield Pause(bakes.is_ready)
             finish_scene(data, findings, bakes)

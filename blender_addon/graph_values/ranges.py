@@ -4,12 +4,12 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import bpy
 
-# Whose values join the set *All*: colours, and what colour nodes do with them. Positions, scales, coordinates and plain
-# numbers have many minima or none, and are named by the user
+# Whose values join the set *All*: colours, what colour nodes do with them, and numbers that are what a socket gets.
+# Positions, scales and coordinates, which may have many minima, and all other numbers are named by the user
 COLOR, SETTING, NUMBER = "color", "setting", "number"
 BY_DEFAULT = (COLOR, SETTING)
 
@@ -49,6 +49,18 @@ SETTINGS = {
     ("ShaderNodeTexNoise", "Detail"): Range(0.0, 15.0, step=ROUGH_STEP),
     ("ShaderNodeTexNoise", "Distortion"): Range(-2.0, 2.0, step=ROUGH_STEP),
 }
+# Inputs by which a node passes amounts on: what comes out is a sum or a multiple of them. So is the value of a socket
+# that nothing else lies before
+AMOUNTS = {
+    "ShaderNodeMapRange": ("To Min", "To Max"),
+    "ShaderNodeMix": ("A", "B"),
+    "ShaderNodeMixRGB": ("Color1", "Color2"),
+    "ShaderNodeClamp": ("Value",),
+    "ShaderNodeMath": ("Value",),
+    "ShaderNodeVectorMath": ("Vector",),
+    "ShaderNodeCombineColor": ("Red", "Green", "Blue"),
+}
+OF_SUMS, OF_PRODUCTS = ("ADD", "SUBTRACT", "MULTIPLY_ADD"), ("MULTIPLY", "DIVIDE")
 LEFT_OUT = (("ShaderNodeBump", "Filter Width"),)  # how nodes are sampled, and not what they show
 DIRECTION = ("ShaderNodeNormalMap", "Color")  # an input whose colour is a direction
 SCALES = ("Scale", "Distance", "Lacunarity", "Brick Width", "Row Height", "Detail Scale")
@@ -70,6 +82,24 @@ def range_of_input(node: bpy.types.Node, socket: bpy.types.NodeSocket, value: fl
         step = ROUGH_STEP if node.bl_idname in MIXES else STEP
         return _around(Range(0.0, 1.0, SETTING if node.bl_idname in MIXES else NUMBER, step=step), value)
     return plain_range(value)
+
+
+def amounts_of(node: bpy.types.Node) -> tuple[str, ...]:
+    """The names of a node's inputs that pass amounts on."""
+    operation = getattr(node, "operation", None)
+    if operation is not None and operation not in (*OF_SUMS, *OF_PRODUCTS):
+        return ()
+    return AMOUNTS.get(node.bl_idname, ())
+
+
+def range_of_amount(node: bpy.types.Node, value: float) -> Range:
+    """The range of a number that a socket of the target gets, or a part of it: about what a socket may hold."""
+    operation = getattr(node, "operation", None)
+    if operation in OF_PRODUCTS and 0.0 <= value <= 1.0:
+        return Range(0.0, 2.0, SETTING)
+    if operation in OF_SUMS and -1.0 <= value <= 1.0:
+        return Range(-1.0, 1.0, SETTING)
+    return replace(plain_range(value), group=SETTING)
 
 
 def plain_range(value: float) -> Range:

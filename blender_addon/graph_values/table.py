@@ -19,12 +19,24 @@ from ..export.nodes.target_shader import DIRECTIONS, TargetShader
 from ..export.nodes.target_shader import Place as SocketPlace
 from . import ranges
 from .place import CURVE_POINT, INPUT, OUTPUT, STOP_COLOR, STOP_POSITION, Place, Value, read
-from .ranges import COLOR, GAIN, NUMBER, OFFSET, Range, plain_range, range_of_input, range_of_stop
+from .ranges import (
+    COLOR,
+    GAIN,
+    NUMBER,
+    OFFSET,
+    Range,
+    amounts_of,
+    plain_range,
+    range_of_amount,
+    range_of_input,
+    range_of_stop,
+)
 from .tint import IMAGE, TINT_GAIN, TINT_OFFSET, is_tint, tint_of
 
 # what a fit on recorded light does not change: light that the target emits, and what lets light through
 EMISSION = ("Emission Color", "Emission Strength")
 NOT_FITTED = (*EMISSION, "Alpha", "Transmission Weight")
+VALUE_NODE = "ShaderNodeValue"
 WEIGHT = "Weight"  # the share of a shader in a mix, among the names of its sockets
 MOST = 256  # values of one graph; what lies further upstream is not offered
 _AXES = ("X", "Y", "Z", "W")
@@ -93,6 +105,7 @@ def graph_values(target: TargetShader) -> list[GraphValue]:
             known.sockets.append(name) if name not in known.sockets else None
             known.asks_color |= is_color
             known.is_direction &= met.is_direction
+            known.is_amount |= met.is_amount and name not in DIRECTIONS
             if len(found) >= MOST:
                 break
     return named_apart([
@@ -201,14 +214,18 @@ class _Met:
     asks_color: bool = False
     label: str = ""  # in place of the node's
     is_direction: bool = False  # whether it comes only where its colour is a direction
+    is_amount: bool = False  # whether it is what a socket of the target gets, or a part of it
+    fed: bpy.types.Node | None = None  # by an input, inside of the group that it is of
 
 
 def _upstream(socket: bpy.types.NodeSocket, groups: tuple[bpy.types.Node, ...], links: Links) -> Iterator[_Met]:
     """The values upstream of a socket that lies in `groups`."""
     seen: set[tuple[Any, ...]] = set()
-    ways: list[tuple[Iterator[Any], bool, bpy.types.NodeSocket]] = [(iter([(socket, groups)]), False, socket)]
+    ways: list[tuple[Iterator[Any], bool, bool, bpy.types.NodeSocket]] = [
+        (iter([(socket, groups)]), False, True, socket)
+    ]
     while ways:
-        sockets, was_direction, inner = ways[-1]
+        sockets, was_direction, was_amount, inner = ways[-1]
         further, within = next(sockets, (None, ()))
         if further is None:
             ways.pop()
@@ -216,23 +233,30 @@ def _upstream(socket: bpy.types.NodeSocket, groups: tuple[bpy.types.Node, ...], 
         if further.node.bl_idname != GROUP:
             inner = further  # what an input of a group stands for
         is_direction = was_direction or (further.node.bl_idname, further.name) == ranges.DIRECTION
+        is_amount = was_amount and (further == socket or _passes_amount(further))
         if not further.is_linked:
             if further.node.bl_idname != GROUP_INPUT and not is_tint(further.node):  # a tint has names of its own
-                yield from _as_direction(_input_values(further, within, inner), is_direction)
+                yield from _with(_input_values(further, within, inner), is_direction, is_amount)
         elif (source := source_of(further, links)) is not None and not source.node.mute:
             node = source.node
-            key = (*(group.as_pointer() for group in within), node.as_pointer(), source.identifier)
+            key = (*(group.as_pointer() for group in within), node.as_pointer(), source.identifier, is_amount)
             if key in seen or not node.is_registered_node_type():
                 continue
             seen.add(key)
             if node.bl_idname not in (GROUP, GROUP_INPUT):
-                yield from _as_direction(_own_values(node, within, source), is_direction)
-            ways.append((feeding(node, source, within), is_direction, inner))
+                own = _own_values(node, within, source)
+                yield from _with(own, is_direction, is_amount and node.bl_idname == VALUE_NODE)
+            ways.append((feeding(node, source, within), is_direction, is_amount, inner))
 
 
-def _as_direction(values: Iterable[_Met], is_direction: bool) -> Iterator[_Met]:
+def _passes_amount(socket: bpy.types.NodeSocket) -> bool:
+    """Whether what a socket has is passed on as it is, or as a part of a sum."""
+    return socket.node.bl_idname in (GROUP, "NodeGroupOutput") or socket.name in amounts_of(socket.node)
+
+
+def _with(values: Iterable[_Met], is_direction: bool, is_amount: bool) -> Iterator[_Met]:
     for met in values:
-        met.is_direction = is_direction
+        met.is_direction, met.is_amount = is_direction, is_amount
         yield met
 
 
@@ -270,11 +294,11 @@ def _input_values(
         limits = range_of_input(inner.node, inner, socket.default_value)
         if limits.group == NUMBER and not limits.scanned:  # nothing is known of it by what it feeds
             limits = range_of_input(node, socket, socket.default_value)
-        yield _Met(place, node, groups, name, False, limits, [])
+        yield _Met(place, node, groups, name, False, limits, [], fed=inner.node)
     elif socket.type == "VECTOR":
         for k, number in enumerate(socket.default_value):
-            axis = replace(place, component=k)
-            yield _Met(axis, node, groups, f"{name} {_AXES[k]}", False, range_of_input(node, socket, number), [])
+            axis, limits = replace(place, component=k), range_of_input(node, socket, number)
+            yield _Met(axis, node, groups, f"{name} {_AXES[k]}", False, limits, [], fed=inner.node)
 
 
 def _own_values(
@@ -283,7 +307,7 @@ def _own_values(
     path = _path(node, groups)
     if node.bl_idname == "ShaderNodeRGB":
         yield _Met(Place(path, OUTPUT, source.identifier), node, groups, "Color", True, Range(0.0, 1.0, COLOR), [])
-    elif node.bl_idname == "ShaderNodeValue":
+    elif node.bl_idname == VALUE_NODE:
         place = Place(path, OUTPUT, source.identifier)
         yield _Met(place, node, groups, "Value", False, plain_range(source.default_value), [])
     elif node.bl_idname == "ShaderNodeValToRGB" and source.name == "Color":
@@ -309,6 +333,8 @@ def _finished(met: _Met, tree: bpy.types.NodeTree) -> GraphValue:
     value = read(tree, place)
     numbers = value if isinstance(value, tuple) else (value,)
     limits = met.range or plain_range(numbers[0])
+    if met.is_amount and limits.group == NUMBER:
+        limits = range_of_amount(met.fed or met.node, numbers[0])
     limits = replace(limits, lower=min(limits.lower, *numbers, limits.upper), upper=max(limits.upper, *numbers))
     label, inside = one_word(met.label or met.node.label or met.node.name), one_word(met.inside)
     return GraphValue(f"{label}/{inside}", label, place, limits, tuple(met.sockets))

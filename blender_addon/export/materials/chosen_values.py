@@ -145,13 +145,16 @@ def request_of(
     region: Region | None = None,
     origin: NDArray[np.float64] | None = None,
 ) -> dict[str, Any]:
-    """What the entry `graph` of request.json has besides for these values; nothing where there are none.
+    """What the entry `graph` of request.json has besides for these values, and the names of all others.
 
     `described` is the material as the job has it. The picture may show a `region` alone.
     """
     material, target = fitted.material, target_shader(fitted.material, fitted.leaf)
-    if not values or material is None or target is None:
+    if material is None or target is None:
         return {}
+    held = {"held": [v.name for v in inside_values(target) if isinstance(v, GraphValue) and v not in values]}
+    if not values:
+        return held
     tree = material.node_tree
     used = dict.fromkeys(name for value in values for name in value.sockets)
     if not used.keys().isdisjoint(DIRECTIONS):  # one frame is made of all of them
@@ -171,6 +174,7 @@ def request_of(
             "slot": fitted.slot, "sockets": {name: path(name) for name in used},
             "view": _view(context.scene, region, origin),
         },
+        **held,
     }  # fmt: skip
 
 

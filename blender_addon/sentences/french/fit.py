@@ -49,6 +49,7 @@ FIT = {
     "The fit ended by itself in the stage {}; these are its best values until then.": "L'ajustement s'est terminé de lui-même à l'étape {} ; voici ses meilleures valeurs jusque-là.",
     "A package cannot be loaded ({}): run `mfo doctor`, or free some memory.": "Un paquet ne peut pas être chargé ({}) : lancer `mfo doctor`, ou libérer de la mémoire.",
     "Nothing was better than the start, so the start was kept.": "Rien n'était meilleur que le départ, donc le départ est gardé.",
+    "The nodes have values that were not fitted ({}): if the reference shows others, choose them, too.": "Les nœuds ont des valeurs qui n'ont pas été ajustées ({}) : si la référence en montre d'autres, choisissez-les aussi.",
     "No perceptual stage was better in a picture of its own, so the end of {} was kept.": "Aucune étape de perception n'était meilleure dans une image à elle, donc la fin de {} est gardée.",
     "Model gap {} %: so far the result stays from the reference, noise taken out. Something in the picture is not in the fit, or the fit ended in the wrong place.": "Écart du modèle {} % : le résultat reste aussi loin de la référence, bruit déduit. Quelque chose dans l'image n'est pas dans l'ajustement, ou il a fini au mauvais endroit.",
     "What is left of the picture ({} %) nobody sees: perceptual stages were left out.": "Ce qui reste de l'image ({} %), personne ne le voit : les étapes de perception ont été omises.",

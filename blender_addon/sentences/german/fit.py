@@ -49,6 +49,7 @@ FIT = {
     "The fit ended by itself in the stage {}; these are its best values until then.": "Die Anpassung endete von selbst in der Stufe {}; dies sind ihre besten Werte bis dahin.",
     "A package cannot be loaded ({}): run `mfo doctor`, or free some memory.": "Ein Paket kann nicht geladen werden ({}): `mfo doctor` aufrufen oder Speicher freigeben.",
     "Nothing was better than the start, so the start was kept.": "Nichts war besser als der Anfang, also wurde er behalten.",
+    "The nodes have values that were not fitted ({}): if the reference shows others, choose them, too.": "Die Knoten haben Werte, die nicht angepasst wurden ({}): zeigt die Referenz andere, auch sie wählen.",
     "No perceptual stage was better in a picture of its own, so the end of {} was kept.": "Keine Stufe der Wahrnehmung war in einem eigenen Bild besser, also wurde das Ende von {} behalten.",
     "Model gap {} %: so far the result stays from the reference, noise taken out. Something in the picture is not in the fit, or the fit ended in the wrong place.": "Modelllücke {} %: so weit bleibt das Ergebnis von der Referenz weg, ohne das Rauschen. Etwas im Bild ist nicht in der Anpassung, oder sie endete am falschen Ort.",
     "What is left of the picture ({} %) nobody sees: perceptual stages were left out.": "Was vom Bild bleibt ({} %), sieht niemand: die Stufen der Wahrnehmung wurden weggelassen.",

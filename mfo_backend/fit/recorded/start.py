@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+from contextlib import nullcontext
 from dataclasses import dataclass
 
 import numpy as np
@@ -52,6 +53,12 @@ def start_from_nothing(setting: Setting) -> Started:
     UnrecordableError
         If no start gives finite numbers.
     """
+    graph = setting.scene.graph
+    with nullcontext() if graph is None else graph.halved():
+        return _started(setting)
+
+
+def _started(setting: Setting) -> Started:
     plan, course, make = setting.plan, setting.course, setting.censored(log_residual)
     with course.stage("scan") as stage:
         recording, edges = _first_recording(setting)

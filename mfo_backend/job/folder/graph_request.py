@@ -18,6 +18,7 @@ MOST_VALUES = 256
 MOST_DEPTHS = 32
 NEAR_AND_FAR = 2  # depths of an opaque target: what the camera sees, and its far side
 FINEST = 4  # subpixels along a pixel; fewer where the picture is large
+_KEYS = ("camera", "positions", "depths", "scale", "values", "evaluate", "held")
 _EVALUATE = ("scene", "layer", "object", "slot", "sockets", "view")
 LARGEST_SIDE = 16384  # pixels; Blender's own limit is 65536, a fit at that size is a mistake
 LAST_FRAME = 1_048_574  # as Blender's
@@ -32,7 +33,8 @@ class NodeGraph:
     They have `scale` subpixels along a pixel.
     `values` are those of the nodes that are fitted, beside the sockets; `evaluate` says where the material is in the
     copy of the file, for the Blender that evaluates it, with the path of names to each socket, whose last word is empty
-    for the weight of a shader in a mix, and the camera, frame and size of the picture.
+    for the weight of a shader in a mix, and the camera, frame and size of the picture. `held` names those that are not
+    fitted.
     """
 
     camera: tuple[tuple[float, ...], ...]
@@ -41,6 +43,7 @@ class NodeGraph:
     scale: int = FINEST
     values: tuple[NodeValue, ...] = ()
     evaluate: Mapping[str, Any] | None = None
+    held: tuple[str, ...] = ()
 
 
 def graph_from_json(data: Any, where: str) -> NodeGraph | None:
@@ -53,7 +56,7 @@ def graph_from_json(data: Any, where: str) -> NodeGraph | None:
     """
     if data is None:
         return None
-    graph = CheckedObject(data, f"{where}: graph", ("camera", "positions", "depths", "scale", "values", "evaluate"))
+    graph = CheckedObject(data, f"{where}: graph", _KEYS)
     rows = graph.raw("camera")
     if not (isinstance(rows, (list, tuple)) and len(rows) == 3):
         raise graph.wrong("camera", "three rows of four numbers")
@@ -73,7 +76,10 @@ def graph_from_json(data: Any, where: str) -> NodeGraph | None:
     camera = tuple(tuple(float(number) for number in row) for row in rows)
     depths = graph.integer("depths", 1, MOST_DEPTHS, 1)
     scale = graph.integer("scale", 1, FINEST, FINEST)
-    return NodeGraph(camera, graph.text("positions"), depths, scale, values, evaluate)
+    held = graph.texts("held", ())
+    if len(held) > MOST_VALUES:
+        raise graph.wrong("held", f"a list of at most {MOST_VALUES}")
+    return NodeGraph(camera, graph.text("positions"), depths, scale, values, evaluate, held)
 
 
 def graph_to_json(graph: NodeGraph | None) -> dict[str, Any] | None:
@@ -81,7 +87,7 @@ def graph_to_json(graph: NodeGraph | None) -> dict[str, Any] | None:
     if graph is None:
         return None
     data = asdict(graph)
-    return data if graph.values else {key: data[key] for key in ("camera", "positions", "depths", "scale")}
+    return data if graph.values else {key: data[key] for key in ("camera", "positions", "depths", "scale", "held")}
 
 
 def _value(data: Any, where: str) -> NodeValue:

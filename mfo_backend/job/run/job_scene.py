@@ -7,6 +7,7 @@ from typing import Any
 
 from ...material.principled.principled_dict import DIRECTIONS
 from ...types.result import FitResult
+from ...types.verdict import Verdict
 from ..folder.graph_files import locate_files
 from ..folder.job_folder import JobFolder
 from ..folder.request import Request, request_to_json
@@ -19,6 +20,8 @@ _GRAPH_UNSEEN = (
     "times: what other things hide has the averages."
 )
 _GRAPH_FLAT = "The fit on whole light paths leaves out the normals that nodes give; pictures and errors have them."
+_GRAPH_STAYED = "The nodes have values that were not fitted ({names}): if the reference shows others, choose them, too."
+MOST_NAMED = 6  # of these values
 
 
 def load_native_code() -> str:
@@ -47,7 +50,8 @@ def named(request: Request) -> dict[str, Any]:
 
 
 def graph_notes(request: Request, result: FitResult) -> tuple[str, ...]:
-    """What is not held of the values that nodes give the target, in sentences."""
+    """What is not held of the values that nodes give the target, and which of them stayed where the result is not the
+    same as the reference, in sentences."""
     material = request.materials.get(request.target.bsdf_id)
     held = [name for name, socket in material.all_sockets if socket.graph] if material is not None else []
     if not held:
@@ -55,10 +59,15 @@ def graph_notes(request: Request, result: FitResult) -> tuple[str, ...]:
     names = ", ".join(held)
     if result.model == "mitsuba_principled":
         return (_GRAPH_AVERAGES.format(names=names),)
-    if not any("whole light paths" in note for note in result.notes):
-        return ()
-    flat = (_GRAPH_FLAT,) if set(DIRECTIONS) & set(held) else ()
-    return (_GRAPH_UNSEEN.format(names=names, depths=1 if request.graph is None else request.graph.depths), *flat)
+    notes = []
+    if any("whole light paths" in note for note in result.notes):
+        notes.append(_GRAPH_UNSEEN.format(names=names, depths=1 if request.graph is None else request.graph.depths))
+        notes += [_GRAPH_FLAT] if set(DIRECTIONS) & set(held) else []
+    stayed = () if request.graph is None else request.graph.held
+    if stayed and result.judgement is not None and result.judgement.verdict is not Verdict.SAME:
+        more = () if len(stayed) <= MOST_NAMED else ("...",)
+        notes.append(_GRAPH_STAYED.format(names=", ".join((*stayed[:MOST_NAMED], *more))))
+    return tuple(notes)
 
 
 def request_materials(folder: JobFolder, request: Request) -> dict[str, dict[str, Any]]:

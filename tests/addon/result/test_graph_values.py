@@ -302,6 +302,8 @@ def test_values_inside_nodes_of_a_cut_out_are_fitted(
     assert request["depths"] == 4
     names = {value["name"] for value in request.get("values", ())}
     assert ("Mix/Factor" in names) is fitted
+    assert ("Noise Texture/Scale" in request["held"]) is fitted
+    assert names.isdisjoint(request["held"])
     assert not [name for name in names if name.startswith("Holes")]
     if fitted:
         assert {socket for value in request["values"] for socket in value["sockets"]} <= set(COLOURED)

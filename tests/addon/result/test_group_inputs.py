@@ -15,7 +15,7 @@ import pytest
         (("ShaderNodeBump", "Strength"), 0.0, 1.0, "setting", True),
         (("ShaderNodeHueSaturation", "Hue"), 0.0, 1.0, "setting", False),
         (("ShaderNodeTexNoise", "Scale"), 0.5, 8.0, "number", True),
-        (("ShaderNodeMath", "Value"), 0.0, 4.0, "number", False),
+        (("ShaderNodeMath", "Value"), 0.0, 4.0, "setting", False),
     ],
     ids=lambda each: each[1] if isinstance(each, tuple) else "",
 )

@@ -96,7 +96,7 @@ def test_the_copy_is_said_before(grouped: SimpleNamespace) -> None:
     found = {f.sentence: f.level for f in quick_check(scene, grouped.bpy.context.view_layer)}
     said = "The group 'Inner' of material 'Glaze' is used elsewhere too: an apply gives the material a copy of its own."
     assert found[said] == "ignored"
-    assert found["Kept as nodes give it, not fitted: Coat Weight, Sheen Weight."] == "fine"
+    assert found["Fitted inside nodes: Group/Shine."] == "fine"
 
 
 def test_animation_inside_a_group_is_found(grouped: SimpleNamespace) -> None:

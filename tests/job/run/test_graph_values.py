@@ -46,7 +46,11 @@ def test_the_entry_comes_back() -> None:
     assert [value.parameter.size for value in graph.values] == [3, 1]
     assert graph_from_json(json.loads(json.dumps(graph_to_json(graph))), "request.json") == graph
     plain = {key: ENTRY[key] for key in ("camera", "positions")}
-    assert set(graph_to_json(graph_from_json(plain, "request.json")) or ()) == {*plain, "depths", "scale"}
+    assert set(graph_to_json(graph_from_json(plain, "request.json")) or ()) == {*plain, "depths", "scale", "held"}
+    held = graph_from_json(plain | {"held": ["Noise Texture/Scale"]}, "request.json")
+    assert held is not None
+    assert held.held == ("Noise Texture/Scale",)
+    assert graph_from_json(graph_to_json(held), "request.json") == held
 
 
 @pytest.mark.parametrize(
