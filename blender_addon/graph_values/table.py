@@ -91,7 +91,7 @@ def graph_values(target: TargetShader) -> list[GraphValue]:
         for met in _upstream(place.socket, place.groups, links):
             known = found.setdefault(met.place, met)
             known.sockets.append(name) if name not in known.sockets else None
-            known.asks_color |= is_color
+            known.asks_color |= is_color and not met.is_grey
             known.is_direction &= met.is_direction
             if len(found) >= MOST:
                 break
@@ -201,6 +201,7 @@ class _Met:
     asks_color: bool = False
     label: str = ""  # in place of the node's
     is_direction: bool = False  # whether it comes only where its colour is a direction
+    is_grey: bool = False  # whether its node's colour is a number for what asks for it here, as a mask is
 
 
 def _upstream(socket: bpy.types.NodeSocket, groups: tuple[bpy.types.Node, ...], links: Links) -> Iterator[_Met]:
@@ -221,12 +222,15 @@ def _upstream(socket: bpy.types.NodeSocket, groups: tuple[bpy.types.Node, ...], 
                 yield from _as_direction(_input_values(further, within, inner), is_direction)
         elif (source := source_of(further, links)) is not None and not source.node.mute:
             node = source.node
-            key = (*(group.as_pointer() for group in within), node.as_pointer(), source.identifier)
+            is_grey = further.type == "VALUE" and source.type == "RGBA"  # Cycles takes the luminance
+            key = (*(group.as_pointer() for group in within), node.as_pointer(), source.identifier, is_grey)
             if key in seen or not node.is_registered_node_type():
                 continue
             seen.add(key)
             if node.bl_idname not in (GROUP, GROUP_INPUT):
-                yield from _as_direction(_own_values(node, within, source), is_direction)
+                for met in _as_direction(_own_values(node, within, source), is_direction):
+                    met.is_grey = is_grey
+                    yield met
             ways.append((feeding(node, source, within), is_direction, inner))
 
 
