@@ -103,7 +103,7 @@ def graph_values(target: TargetShader) -> list[GraphValue]:
         for met in _upstream(place.socket, place.groups, links):
             known = found.setdefault(met.place, met)
             known.sockets.append(name) if name not in known.sockets else None
-            known.asks_color |= is_color
+            known.asks_color |= is_color and not met.is_grey
             known.is_direction &= met.is_direction
             known.is_amount |= met.is_amount and name not in DIRECTIONS
             if len(found) >= MOST:
@@ -215,6 +215,7 @@ class _Met:
     label: str = ""  # in place of the node's
     is_direction: bool = False  # whether it comes only where its colour is a direction
     is_amount: bool = False  # whether it is what a socket of the target gets, or a part of it
+    is_grey: bool = False  # whether its node's colour is a number for what asks for it here, as a mask is
     fed: bpy.types.Node | None = None  # by an input, inside of the group that it is of
 
 
@@ -239,13 +240,14 @@ def _upstream(socket: bpy.types.NodeSocket, groups: tuple[bpy.types.Node, ...], 
                 yield from _with(_input_values(further, within, inner), is_direction, is_amount)
         elif (source := source_of(further, links)) is not None and not source.node.mute:
             node = source.node
-            key = (*(group.as_pointer() for group in within), node.as_pointer(), source.identifier, is_amount)
+            is_grey = further.type == "VALUE" and source.type == "RGBA"  # Cycles takes the luminance
+            key = (*(group.as_pointer() for group in within), node.as_pointer(), source.identifier, is_amount, is_grey)
             if key in seen or not node.is_registered_node_type():
                 continue
             seen.add(key)
             if node.bl_idname not in (GROUP, GROUP_INPUT):
-                own = _own_values(node, within, source)
-                yield from _with(own, is_direction, is_amount and node.bl_idname == VALUE_NODE)
+                is_own_amount = is_amount and node.bl_idname == VALUE_NODE
+                yield from _with(_own_values(node, within, source), is_direction, is_own_amount, is_grey)
             ways.append((feeding(node, source, within), is_direction, is_amount, inner))
 
 
@@ -254,9 +256,9 @@ def _passes_amount(socket: bpy.types.NodeSocket) -> bool:
     return socket.node.bl_idname in (GROUP, "NodeGroupOutput") or socket.name in amounts_of(socket.node)
 
 
-def _with(values: Iterable[_Met], is_direction: bool, is_amount: bool) -> Iterator[_Met]:
+def _with(values: Iterable[_Met], is_direction: bool, is_amount: bool, is_grey: bool = False) -> Iterator[_Met]:
     for met in values:
-        met.is_direction, met.is_amount = is_direction, is_amount
+        met.is_direction, met.is_amount, met.is_grey = is_direction, is_amount, is_grey
         yield met
 
 

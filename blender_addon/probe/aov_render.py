@@ -28,6 +28,8 @@ MOST_AOV_BYTES = 2 * 10**9
 BYTES_PER_VALUE = 16
 LEAST_TRANSPARENT = 16  # surfaces that a ray may pass: those before the target, and its own
 
+Bounds = tuple[int, int, int, int]  # left, top, right and bottom, in pixels of the picture
+
 
 @dataclass(frozen=True)
 class Frame:
@@ -65,14 +67,17 @@ def frame_of(
     scale: int,
     outputs: int,
     region: Region | None = None,
+    seen: Bounds | None = None,
 ) -> Frame | None:
     """The frame around `obj`, and whatever else shows the material, with at most `scale` subpixels along a pixel.
 
-    Less where the AOVs would be too large. The picture may show a `region` of it alone. None where all of it is beside
-    the picture or behind the camera.
+    Less where the AOVs would be too large. The picture may show a `region` of it alone. What Cycles has `seen` of it
+    may reach beyond its faces, which are those of the evaluated file. None where all of it is beside the picture or
+    behind the camera.
     """
     size = square_size(scene.render)
     bounds = _bounds(scene, obj, material, size, region or Region(0, 0, *size))
+    bounds = _around(bounds, seen) if bounds and seen else bounds or seen
     if bounds is None:
         return None
     left, top, right, bottom = bounds
@@ -81,6 +86,32 @@ def frame_of(
         scale //= 2
     sides = (left * scale, top * scale, right * scale, bottom * scale)
     return Frame(scale, *sides, (size[0] * scale, size[1] * scale))
+
+
+def whole_frame(scene: bpy.types.Scene, region: Region | None) -> Frame:
+    """All that the picture shows, a subpixel to a pixel."""
+    size = square_size(scene.render)
+    return Frame(1, *_whole(size, region or Region(0, 0, *size)), size)
+
+
+def bounds_of(seen: NDArray[np.bool_], frame: Frame) -> Bounds | None:
+    """The pixels of a frame that show something, and as far around them as a pixel filter looks; None where none do."""
+    if not seen.any():
+        return None
+    rows, columns = np.flatnonzero(seen.any(axis=1)), np.flatnonzero(seen.any(axis=0))
+    margin = int(FILTER_MARGIN)
+    return (
+        max(frame.left + int(columns[0]) - margin, frame.left),
+        max(frame.top + int(rows[0]) - margin, frame.top),
+        min(frame.left + int(columns[-1]) + 1 + margin, frame.right),
+        min(frame.top + int(rows[-1]) + 1 + margin, frame.bottom),
+    )
+
+
+def _around(first: Bounds, second: Bounds) -> Bounds:
+    """What holds both."""
+    least, most = (tuple(map(pick, first, second)) for pick in (min, max))
+    return least[0], least[1], most[2], most[3]
 
 
 def world_to_frame(scene: bpy.types.Scene, frame: Frame) -> NDArray[np.float64]:
@@ -237,23 +268,28 @@ def shows(instance: bpy.types.DepsgraphObjectInstance, material: bpy.types.Mater
     return any(each is not None and each.original == material for each in every)
 
 
+def _whole(size: tuple[int, int], region: Region) -> Bounds:
+    """The pixels of a region, and as far around them as a pixel filter looks."""
+    margin = int(FILTER_MARGIN)
+    return (
+        max(region.left - margin, 0),
+        max(region.top - margin, 0),
+        min(region.right + margin, size[0]),
+        min(region.bottom + margin, size[1]),
+    )
+
+
 def _bounds(
     scene: bpy.types.Scene,
     obj: bpy.types.Object,
     material: bpy.types.Material,
     size: tuple[int, int],
     region: Region,
-) -> tuple[int, int, int, int] | None:
+) -> Bounds | None:
     """Left, top, right and bottom of the pixels of a region that can see `obj` or the material; all where one of them
     reaches behind the camera, None where there are none."""
     width, height = size
-    margin = int(FILTER_MARGIN)
-    whole = (
-        max(region.left - margin, 0),
-        max(region.top - margin, 0),
-        min(region.right + margin, width),
-        min(region.bottom + margin, height),
-    )
+    whole = _whole(size, region)
     corners = []
     depsgraph = bpy.context.evaluated_depsgraph_get()
     for instance in depsgraph.object_instances:

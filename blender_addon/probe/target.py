@@ -7,6 +7,7 @@ import math
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass, field
+from functools import cached_property
 from typing import Any
 
 import bpy
@@ -17,10 +18,11 @@ from ..export.camera.camera_model import Region
 from ..export.images.color_space import to_rec709
 from ..export.nodes.closure_leaves import OUTPUT
 from ..export.nodes.dependence import OF_FACING, asked_for
-from ..export.nodes.displacement import SHADING_NORMAL, bends_normals
+from ..export.nodes.displacement import SHADING_NORMAL, bends_normals, moves_faces
 from ..export.nodes.shader_graph import source_of
+from ..export.render_state import render_state
 from ..versions import active_output
-from .aov_render import Frame, frame_of, render_outputs
+from .aov_render import Bounds, Frame, bounds_of, frame_of, render_outputs, whole_frame
 from .closure_tree import ClosureTree, Leaf, within_bounds
 from .graph_copy import node_at, nodes_of, own_copy, remove_copy
 from .server import ProbeRequestError
@@ -76,20 +78,31 @@ class Target:
 
     def frame(self, scale: int, outputs: int) -> Frame:
         """See `frame_of`; raises `NotSeenError` where there is none."""
-        frame = frame_of(self.scene, self.obj, self.material, scale, outputs, self.region)
+        seen = self._seen if moves_faces(self.material) else None
+        with render_state(self.layer, self.scene):  # modifiers and particles may be others in the viewport
+            frame = frame_of(self.scene, self.obj, self.material, scale, outputs, self.region, seen)
         if frame is None:
             raise NotSeenError(NOT_SEEN.format(obj=self.obj.name))
         return frame
 
-    def why_nothing(self, frame: Frame, samples: int) -> ProbeRequestError:
-        """Why Cycles has shown nothing of it: nothing is seen without its nodes either, or they are too many."""
+    @cached_property
+    def _seen(self) -> Bounds | None:
+        """What Cycles shows of the material, which its displacement may have moved beyond all bounds."""
+        frame = whole_frame(self.scene, self.region)
+        return bounds_of(self._mask(frame, 1)[..., 0] > SEEN, frame)
+
+    def _mask(self, frame: Frame, samples: int) -> NDArray[np.float32]:
+        """Where Cycles shows the material, whatever its nodes are."""
         copy = own_copy(self.material)
         try:
             make_opaque(copy)
-            mask = self.outputs(copy, [(MASK, False), (POSITION, True)], frame, samples)[MASK]
+            return self.outputs(copy, [(MASK, False), (POSITION, True)], frame, samples)[MASK]
         finally:
             remove_copy(copy)
-        if (mask > SEEN).any():
+
+    def why_nothing(self, frame: Frame, samples: int) -> ProbeRequestError:
+        """Why Cycles has shown nothing of it: nothing is seen without its nodes either, or they are too many."""
+        if (self._mask(frame, samples) > SEEN).any():
             return ProbeRequestError(TOO_MANY.format(material=self.material.name))
         return NotSeenError(NOT_SEEN.format(obj=self.obj.name))
 

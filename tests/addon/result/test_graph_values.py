@@ -98,6 +98,19 @@ def test_a_colour_that_is_a_direction_is_no_value(graph: SimpleNamespace) -> Non
     assert set(paint.sockets) == {"Base Color", "Normal"}  # here it is a colour, too
 
 
+def test_a_mask_is_one_number_also_where_it_reaches_a_colour(graph: SimpleNamespace) -> None:
+    """The stops of a ramp that is a factor: three numbers of each had no effect but by their luminance."""
+    tree = graph.material.node_tree
+    mask, mix = tree.nodes.new("ShaderNodeValToRGB"), tree.nodes.new("ShaderNodeMixRGB")
+    mask.name = "Mask"
+    tree.links.new(graph.noise.outputs[0], mask.inputs[0])
+    tree.links.new(mask.outputs["Color"], mix.inputs[0])
+    tree.links.new(mix.outputs[0], graph.shader.inputs["Base Color"])
+    assert {values_of(graph.material)[f"Mask/Stop {k}"].place.size for k in (0, 1)} == {1}
+    tree.links.new(mask.outputs["Color"], mix.inputs["Color2"])  # met as a number first
+    assert {values_of(graph.material)[f"Mask/Stop {k}"].place.size for k in (0, 1)} == {3}
+
+
 def test_sets_and_names(graph: SimpleNamespace) -> None:
     from blender_addon.export.nodes.target_shader import target_shader
     from blender_addon.graph_values.mix_values import default_values

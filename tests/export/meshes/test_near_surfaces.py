@@ -1,16 +1,17 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Surfaces a tenth of a millimetre apart, of which the first lets light through. Oracle: Cycles' render."""
+"""Surfaces a tenth of a millimetre apart, and small things that stand on large ones. Oracle: Cycles' render."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
 from typing import Any
 
+import bpy
 import numpy as np
 import pytest
 
 from ..scene.test_light_paths import picture_of, scene_reference
-from ..scenes import add_camera, add_quad, diffuse_material, new_material, world_color
+from ..scenes import add_camera, add_light, add_quad, diffuse_material, new_material, world_color
 
 KINDS = {
     "cut-out": {"Base_Color": (0.8, 0.3, 0.1), "Alpha": 0.4},
@@ -35,4 +36,22 @@ def test_what_lies_close_below_is_seen_and_lit(
     add_quad("Above", 0.6, 1.0 + gap, new_material("Above", **KINDS[kind]))
     expected = render_cycles()
     ours = picture_of(export(below, reference=scene_reference(expected)), rounds=16)
+    np.testing.assert_allclose(ours.mean(axis=(0, 1)), expected.mean(axis=(0, 1)), rtol=0.005)
+
+
+def test_light_reaches_below_a_small_thing_on_a_shelf(
+    scene: Any, export: Any, render_cycles: Callable[[], Any], mitsuba: Any
+) -> None:
+    """A ball of 4 mm on a shelf of a metre, all opaque: what the shelf shows around the place where they touch."""
+    scene.render.resolution_x = scene.render.resolution_y = 24
+    scene.cycles.max_bounces = scene.cycles.diffuse_bounces = 4
+    scene.cycles.samples = 512
+    world_color(scene, 0.5)
+    add_light("AREA", (-0.01, -0.02, 0.03), rotation=(0.6, -0.3, 0.0), energy=0.01, size=0.01)
+    add_camera("ORTHO", (0, -0.02, 0.012), rotation=(1.05, 0, 0), ortho_scale=0.003, clip_start=1e-4)
+    shelf = add_quad("Shelf", 1.0, 0.0, diffuse_material("Shelf", (0.6, 0.5, 0.4)))
+    bpy.ops.mesh.primitive_uv_sphere_add(radius=0.002, location=(0.0, 0.0, 0.002), segments=48, ring_count=24)
+    bpy.context.object.data.materials.append(diffuse_material("Ball", (0.6, 0.1, 0.1)))
+    expected = render_cycles()
+    ours = picture_of(export(shelf, reference=scene_reference(expected)), rounds=16)
     np.testing.assert_allclose(ours.mean(axis=(0, 1)), expected.mean(axis=(0, 1)), rtol=0.005)
