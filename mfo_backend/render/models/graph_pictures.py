@@ -129,6 +129,7 @@ class GraphPictures:
         most = MOST_SUBPIXELS_OF_NORMALS if turns else MOST_SUBPIXELS
         scale = SCALE_OF_SMALL if pixels * SCALE_OF_SMALL**2 <= most else SCALE_OF_LARGE
         self._known = self._whole = _Known(scale)
+        self._half = _Known(max(scale // 2, 1))
         self.table = table_of(values)
         self._values, self._evaluate = tuple(values), evaluate
         changed = {name for value in values for name in value.sockets}
@@ -172,7 +173,7 @@ class GraphPictures:
     def halved(self) -> Iterator[None]:
         """Inside of the block states have half the subpixels along a pixel, each in the place of four: a quarter of the
         time, and near enough for a search."""
-        with self._by(_Known(max(self._whole.scale // 2, 1))):
+        with self._by(self._half):
             yield
 
     @contextmanager
