@@ -3,7 +3,6 @@
 
 from __future__ import annotations
 
-from contextlib import AbstractContextManager, nullcontext
 from dataclasses import dataclass
 
 import numpy as np
@@ -61,8 +60,7 @@ def start_from_nothing(setting: Setting) -> Started:
         lanes = plan.scan_lanes if setting.sampled else plan.exact_scan_lanes
         few = recording.problem(fewer_groups(groups, setting.reference, lanes), make, calm=True)
         scanned = best_scanned(setting, recording)
-        with _halved(setting):
-            starts = _starts(setting, few, stage, scanned[0])
+        starts = _starts(setting, few, stage, scanned[0])
         stage.vector = starts[0] if starts else None
     with course.stage("start") as stage:
         if not recording.thinned:
@@ -71,21 +69,15 @@ def start_from_nothing(setting: Setting) -> Started:
         more = recording.problem(fewer_groups(groups, setting.reference, lanes), make, calm=True)
         users = [placed(setting.user, values) for values in scanned]
         others = [*users, placed(random_start(setting.table, setting.seed), scanned[0])]
-        with _halved(setting):
-            basins = race(
-                lambda x, evaluations, known: solve(setting, more, x, evaluations, stage=stage, known=known),
-                [*starts, *others], setting.table, plan, course.should_stop,
-            )  # fmt: skip
+        basins = race(
+            lambda x, evaluations, known: solve(setting, more, x, evaluations, stage=stage, known=known),
+            [*starts, *others], setting.table, plan, course.should_stop,
+        )  # fmt: skip
         if not np.isfinite(basins[0].equations.cost):
             raise UnrecordableError("No start of the fit gives finite numbers on the recorded light paths.")
         stage.vector = basins[0].x
         course.show(stage, stage.vector)  # near the result, and what makes sure of it takes as long again
     return Started(None if setting.sampled else recording, tuple(basin.x for basin in basins), edges)
-
-
-def _halved(setting: Setting) -> AbstractContextManager[None]:
-    """Fewer subpixels of what nodes give, which is near enough for a search."""
-    return nullcontext() if setting.scene.graph is None else setting.scene.graph.halved()
 
 
 def _first_recording(setting: Setting) -> tuple[Recording, NDArray[np.bool_] | None]:

@@ -7,8 +7,7 @@ Somebody else evaluates the nodes (`Evaluate`); derivatives are forward differen
 from __future__ import annotations
 
 from collections import OrderedDict
-from collections.abc import Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Protocol
 
@@ -92,16 +91,6 @@ class GraphState:
         return GraphState(pictures, self.slopes)
 
 
-@dataclass
-class _Known:
-    """States with so many subpixels along a pixel: the last ones by their vector, and those that were evaluated, the
-    newest last."""
-
-    scale: int
-    states: OrderedDict[bytes, GraphState] = field(default_factory=OrderedDict)
-    exact: list[tuple[Vector, GraphState]] = field(default_factory=list)
-
-
 class GraphPictures:
     """The free values of a graph and the pictures that they give.
 
@@ -127,9 +116,7 @@ class GraphPictures:
         self._fine_scale = fine
         turns = any(name in DIRECTIONS for value in values for name in value.sockets)
         most = MOST_SUBPIXELS_OF_NORMALS if turns else MOST_SUBPIXELS
-        scale = SCALE_OF_SMALL if pixels * SCALE_OF_SMALL**2 <= most else SCALE_OF_LARGE
-        self._known = self._whole = _Known(scale)
-        self._half = _Known(max(scale // 2, 1))
+        self._scale = SCALE_OF_SMALL if pixels * SCALE_OF_SMALL**2 <= most else SCALE_OF_LARGE
         self.table = table_of(values)
         self._values, self._evaluate = tuple(values), evaluate
         changed = {name for value in values for name in value.sockets}
@@ -144,9 +131,13 @@ class GraphPictures:
             for socket in self._sockets
         }
         self._width = self.table.width
+        self._states: OrderedDict[bytes, GraphState] = OrderedDict()
+        self._exact: list[tuple[Vector, GraphState]] = []  # those that were evaluated, the newest last
         self._moves: list[tuple[Vector, Vector]] = []  # between two states, in widths of the box, and how slopes change
         self._bend: NDArray[np.float64] | None = None  # see `_bend_of`; unknown before two states are
-        self._finer = FinerPictures(self._rendered, self._in_whole, lambda: self._is_seen, self._width)
+        self._finer = FinerPictures(
+            self._rendered, lambda vector: self.state(vector).pictures, lambda: self._is_seen, self._width
+        )
         self._seen: tuple[Picture, NDArray[np.float64]] | None = None
 
     def seen(self, vector: Vector) -> tuple[Picture, NDArray[np.float64]]:
@@ -161,32 +152,13 @@ class GraphPictures:
 
         They are extrapolated from a known state where that is about as good.
         """
-        key, states = vector.tobytes(), self._known.states
-        if key not in states:
-            states[key] = self._extrapolated(vector) or self._evaluated(vector)
-            if len(states) > KEPT_ANSWERS:
-                states.popitem(last=False)
-        states.move_to_end(key)
-        return states[key]
-
-    @contextmanager
-    def halved(self) -> Iterator[None]:
-        """Inside of the block states have half the subpixels along a pixel, each in the place of four: a quarter of the
-        time, and near enough for a search."""
-        with self._by(self._half):
-            yield
-
-    @contextmanager
-    def _by(self, known: _Known) -> Iterator[None]:
-        before, self._known = self._known, known
-        try:
-            yield
-        finally:
-            self._known = before
-
-    def _in_whole(self, vector: Vector) -> Mapping[str, NDArray[np.float32]]:
-        with self._by(self._whole):
-            return self.state(vector).pictures
+        key = vector.tobytes()
+        if key not in self._states:
+            self._states[key] = self._extrapolated(vector) or self._evaluated(vector)
+            if len(self._states) > KEPT_ANSWERS:
+                self._states.popitem(last=False)
+        self._states.move_to_end(key)
+        return self._states[key]
 
     @property
     def scanned(self) -> tuple[int, ...]:
@@ -202,9 +174,9 @@ class GraphPictures:
     def plain(self, vectors: Sequence[Vector]) -> list[Mapping[str, NDArray[np.float32]]]:
         """Flat pictures by parameter at each vector, without derivatives."""
         variants = [(self._as_values(vector), self._sockets) for vector in vectors]
-        return [
-            {name_of(socket): picture for socket, picture in pictures.items()} for pictures in self._looked_at(variants)
-        ]
+        found = self._evaluate(variants, scale=self._scale, samples=1)
+        seen = np.isfinite(found.positions).all(axis=2).ravel()
+        return [{name_of(s): _flat(picture, seen) for s, picture in pictures.items()} for pictures in found.pictures]
 
     def coarser(self, state: GraphState) -> GraphState:
         """The state as of half the subpixels along a pixel: two by two have their mean, where the camera sees all."""
@@ -225,34 +197,30 @@ class GraphPictures:
 
     def settle(self, vector: Vector) -> None:
         """Evaluate the nodes at this vector, from where nearby states are extrapolated from now on."""
-        known = self._known
-        if not any(np.array_equal(exact, vector) for exact, _ in known.exact):
-            state = self._evaluated(vector)
-            known.states.clear()
-            known.states[vector.tobytes()] = state
+        if not any(np.array_equal(known, vector) for known, _ in self._exact):
+            self._states = OrderedDict({vector.tobytes(): self._evaluated(vector)})
 
     def _evaluated(self, vector: Vector) -> GraphState:
-        state, exact = self._state(vector), self._known.exact
-        for known, other in exact:
+        state = self._state(vector)
+        for known, other in self._exact:
             way = np.abs(vector - known) / self._width
             self._moves.append((way, _change(state, other) * self._width))
         if self._moves:
             self._bend = _bend_of(self._moves)
         kept = max(KEPT_BYTES // state.bytes, KEPT_ANSWERS)
-        self._known.exact = [*exact[1 - kept :], (vector.copy(), state)]
+        self._exact = [*self._exact[1 - kept :], (vector.copy(), state)]
         return state
 
     def _extrapolated(self, vector: Vector) -> GraphState | None:
         """The state by the slopes of a known one, None where the nodes have to be evaluated."""
-        exact = self._known.exact
-        if self._bend is None or not exact:
+        if self._bend is None:
             return None
-        ways = [(vector - known) / self._width for known, _ in exact]
+        ways = [(vector - known) / self._width for known, _ in self._exact]
         errors = [0.5 * float(np.abs(way) @ self._bend @ np.abs(way)) for way in ways]
         best = int(np.argmin(errors))
         if errors[best] > EXTRAPOLATED:
             return None
-        known, state = exact[best]
+        known, state = self._exact[best]
         return state.moved(vector - known)
 
     def fine(self, vector: Vector) -> Mapping[str, Shown]:
@@ -273,7 +241,7 @@ class GraphPictures:
     def _rendered(self, vector: Vector) -> Mapping[str, Shown]:
         variants = [(self._as_values(vector), self._sockets)]
         found = self._evaluate(variants, scale=self._fine_scale, samples=FINE_SAMPLES, elsewhere=True)
-        seen = np.isfinite(found.positions).all(axis=2)
+        seen = np.isfinite(found.positions).all(axis=2).ravel()
         return {
             # of a direction that nobody knows the mesh's own is taken
             name_of(s): Shown(p, found.elsewhere.get(s), None if s in DIRECTIONS else _flat(p, seen)[-1])
@@ -287,26 +255,15 @@ class GraphPictures:
             there = vector.copy()
             there[j] += step
             variants.append((self._as_values(there), self._components[j][0].sockets))
-        here, *there = self._looked_at(variants)
+        found = self._evaluate(variants, scale=self._scale, samples=1)
+        self._seen = found.positions, found.camera
+        seen = np.isfinite(found.positions).all(axis=2).ravel()
+        here = {socket: _flat(picture, seen) for socket, picture in found.pictures[0].items()}
         slopes: dict[str, dict[int, NDArray[np.float32]]] = {name_of(socket): {} for socket in here}
-        for j, (step, pictures) in enumerate(zip(steps, there, strict=True)):
+        for j, (step, pictures) in enumerate(zip(steps, found.pictures[1:], strict=True)):
             for socket, picture in pictures.items():
-                slopes[name_of(socket)][j] = (picture - here[socket]) / np.float32(step)
+                slopes[name_of(socket)][j] = (_flat(picture, seen) - here[socket]) / np.float32(step)
         return GraphState({name_of(socket): picture for socket, picture in here.items()}, slopes)
-
-    def _looked_at(self, variants: Sequence[Variant]) -> list[dict[str, NDArray[np.float32]]]:
-        """Flat pictures of variants by socket, in whole subpixels."""
-        found = self._evaluate(variants, scale=self._known.scale, samples=1)
-        if self._known is self._whole:
-            self._seen = found.positions, found.camera
-        elif self._seen is None:
-            with self._by(self._whole):
-                self._looked_at([(variants[0][0], self._sockets[:1])])
-        seen, rows = np.isfinite(found.positions).all(axis=2), len(self._is_seen)
-        return [
-            {socket: _flat(picture, seen, rows // len(seen)) for socket, picture in pictures.items()}
-            for pictures in found.pictures
-        ]
 
     def _pairs(self, vector: Vector) -> list[tuple[float, tuple[NodeValue, int]]]:
         return list(zip(map(float, vector), self._components, strict=True))
@@ -364,11 +321,8 @@ def _coarser(flat: NDArray[np.float32], seen: NDArray[np.bool_]) -> NDArray[np.f
     return np.concatenate([np.where(whole, means, blocks).reshape(-1, flat.shape[1]), flat[-1:]])
 
 
-def _flat(picture: Picture, seen: NDArray[np.bool_], times: int = 1) -> NDArray[np.float32]:
-    """(subpixels + 1, numbers), the last the mean over the target; each subpixel `times` along both sides, and then the
-    mean where it does not see the target."""
-    mean = picture[seen].mean(axis=0, dtype=np.float64) if seen.any() else np.zeros(picture.shape[2])
-    mean = mean.astype(np.float32)
-    if times > 1:
-        picture = np.where(seen[..., None], picture, mean).repeat(times, axis=0).repeat(times, axis=1)
-    return np.concatenate([picture.reshape(-1, picture.shape[2]), mean[None]])
+def _flat(picture: Picture, seen: NDArray[np.bool_]) -> NDArray[np.float32]:
+    """(subpixels + 1, numbers), the last the mean over the target."""
+    rows = picture.reshape(-1, picture.shape[2])
+    mean = rows[seen].mean(axis=0, dtype=np.float64) if seen.any() else np.zeros(rows.shape[1])
+    return np.concatenate([rows, mean[None].astype(np.float32)])

@@ -3,8 +3,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
-from contextlib import ExitStack, contextmanager
+from collections.abc import Mapping, Sequence
 from typing import TypeAlias
 
 import numpy as np
@@ -51,14 +50,6 @@ class JoinedGraph:
         """Pictures alone."""
         found = zip(*(graph.plain(vectors) for graph in self._graphs), strict=True)
         return [{name: np.concatenate([part[name] for part in parts]) for name in self.varying} for parts in found]
-
-    @contextmanager
-    def halved(self) -> Iterator[None]:
-        """See `GraphPictures.halved`."""
-        with ExitStack() as stack:
-            for graph in self._graphs:
-                stack.enter_context(graph.halved())
-            yield
 
     def begins(self, vector: Vector) -> list[int]:
         """The first row of each picture."""

@@ -168,43 +168,6 @@ def test_finer_pictures_are_kept_and_change_with_those_of_a_solve() -> None:
     assert nodes.variants == [1, 5, 5]  # the states at both
 
 
-class Scaled(Nodes):
-    """The same noise with as many subpixels as it is asked for of a picture of 2 x 2 pixels."""
-
-    def __init__(self) -> None:
-        super().__init__()
-        self.scales: list[int] = []
-
-    def __call__(self, variants: Sequence[Variant], *, scale: int, samples: int, elsewhere: bool = False) -> Evaluated:
-        self.scales.append(scale)
-        found = super().__call__(variants, scale=scale, samples=samples, elsewhere=elsewhere)
-        every = slice(None, None, 4 // scale)
-        cut = lambda picture: picture[:4, :8][every, every]  # noqa: E731
-        pictures = [{name: cut(picture) for name, picture in known.items()} for known in found.pictures]
-        return Evaluated(pictures, cut(found.positions), found.camera)
-
-
-def test_a_search_looks_at_half_the_subpixels_and_forgets_them() -> None:
-    nodes, at = Scaled(), np.array([0.5, 0.5, 0.5, 2.0])
-    pictures = graph(nodes)
-    with pictures.halved():
-        rough = pictures.state(at)
-        (plain,) = pictures.plain([at])
-        shown = pictures.fine(at)["roughness"].picture
-    assert nodes.scales == [2, 4, 2, 4]  # where whole subpixels are is asked once
-    noise = NOISE[:4, :8, 0] ** 2
-    found = rough.pictures["roughness"][:-1].reshape(4, 8)
-    for row, column in ((2, 0), (2, 6), (3, 7)):
-        assert found[row, column] == noise[row // 2 * 2, column // 2 * 2]
-    mean = noise[2, ::2].mean()  # half subpixels of the first row are beside the target
-    np.testing.assert_allclose(found[:2], mean, rtol=1e-6)
-    assert rough.pictures["roughness"][-1] == found[0, 0]
-    np.testing.assert_array_equal(plain["roughness"], rough.pictures["roughness"])
-    assert shown.shape == (4, 8, 1)
-    np.testing.assert_allclose(pictures.state(at).pictures["roughness"][:-1].reshape(4, 8), noise, rtol=1e-6)
-    assert nodes.scales == [2, 4, 2, 4, 4]
-
-
 def test_states_are_kept_as_far_as_memory_goes() -> None:
     """Starts of a fit come back to the same values: those of few slopes are known longer than those of many."""
     nodes = Nodes()

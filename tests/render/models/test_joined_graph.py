@@ -7,7 +7,7 @@ import numpy as np
 
 from mfo_backend.render.models.joined_graph import JoinedGraph
 
-from .test_graph_pictures import Nodes, Scaled, graph
+from .test_graph_pictures import Nodes, graph
 
 
 class Fewer(Nodes):
@@ -35,11 +35,3 @@ def test_rows_of_two_pictures() -> None:
             np.testing.assert_array_equal(joined.coarser(state).pictures["base_color"][rows], coarse)
             (plain,) = part.plain([vector])
             np.testing.assert_array_equal(joined.plain([vector])[0]["roughness"][rows], plain["roughness"])
-
-
-def test_all_pictures_are_looked_at_by_half_their_subpixels() -> None:
-    nodes = Scaled(), Scaled()
-    joined = JoinedGraph([graph(each) for each in nodes])
-    with joined.halved():
-        joined.state(np.array([0.2, 0.3, 0.9, 2.0]))
-    assert [each.scales for each in nodes] == [[2, 4], [2, 4]]
