@@ -27,6 +27,7 @@ FILTER_MARGIN = 2.0  # pixels around the target: as far as a pixel filter looks
 MOST_AOV_BYTES = 2 * 10**9
 BYTES_PER_VALUE = 16
 LEAST_TRANSPARENT = 16  # surfaces that a ray may pass: those before the target, and its own
+BENDING = ("ShaderNodeBsdfGlass", "ShaderNodeBsdfRefraction")
 
 Bounds = tuple[int, int, int, int]  # left, top, right and bottom, in pixels of the picture
 
@@ -244,11 +245,24 @@ def _settings(scene: bpy.types.Scene, layer: bpy.types.ViewLayer, frame: Frame, 
         for item in scene.objects:
             if item.type == "LIGHT":
                 put(item, "hide_render", True)
+            elif _is_glass(item):  # behind it there would be no outputs; what it bends is found by its place
+                put(item, "visible_camera", False)
         save_as_multilayer(render.image_settings)
         yield put
     finally:
         for owner, name, value in reversed(before):
             setattr(owner, name, value)
+
+
+def _is_glass(item: bpy.types.Object) -> bool:
+    """Whether light goes through an object by a bend, and nothing of it is looked at."""
+    trees = [slot.material.node_tree for slot in item.material_slots if slot.material and slot.material.node_tree]
+    nodes = [node for tree in trees for node in tree.nodes]
+    if any(node.bl_idname == "ShaderNodeOutputAOV" for node in nodes):
+        return False
+    weights = [node.inputs.get("Transmission Weight") for node in nodes]
+    through = any(weight is not None and (weight.is_linked or weight.default_value > 0.0) for weight in weights)
+    return through or any(node.bl_idname in BENDING for node in nodes)
 
 
 def _joined(channels: dict[str, NDArray[np.float32]], name: str) -> NDArray[np.float32]:

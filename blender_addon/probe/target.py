@@ -4,7 +4,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 from functools import cached_property
@@ -29,7 +29,7 @@ from .server import ProbeRequestError
 
 MASK, POSITION = "mfo mask", "mfo position"
 BUMP = "ShaderNodeBump"
-TANGENT = "Tangent"
+TANGENT, ALPHA = "Tangent", "Alpha"
 DIRECTIONS = (SHADING_NORMAL, "Normal", "Coat Normal", TANGENT)
 NOT_SEEN = "The camera does not see '{obj}': move it into the frame."
 # Cycles says so on its stderr alone, and shows nothing
@@ -227,6 +227,29 @@ def write_outputs(tree: bpy.types.NodeTree, path: list[str], outputs: Mapping[st
         kinds[name] = "VALUE" if socket.type not in ("RGBA", "VECTOR") else socket.type
         _output(inner, output, within_bounds(inner, shader, socket, source), kinds[name] != "VALUE")
     return kinds
+
+
+def weigh_outputs(tree: bpy.types.NodeTree, path: Sequence[str], names: Sequence[str], output: str) -> bool:
+    """Multiply these outputs by the Alpha of their shader, and put one of the given name on that; False without a link.
+
+    They are in the shader's tree.
+    """
+    inner, shader = node_at(tree, path)
+    socket = shader.inputs.get(ALPHA)
+    source = None if socket is None else source_of(socket)
+    if source is None:
+        return False
+    alpha = within_bounds(inner, shader, socket, source)
+    for node in [node for node in inner.nodes if node.bl_idname == "ShaderNodeOutputAOV" and node.aov_name in names]:
+        link = next(each for each in inner.links if each.to_node == node)
+        is_color, value, end = link.to_socket.name == "Color", link.from_socket, link.to_socket
+        scaled = inner.nodes.new("ShaderNodeVectorMath" if is_color else "ShaderNodeMath")
+        scaled.operation = "SCALE" if is_color else "MULTIPLY"
+        inner.links.new(value, scaled.inputs[0])
+        inner.links.new(alpha, scaled.inputs["Scale"] if is_color else scaled.inputs[1])
+        inner.links.new(scaled.outputs[0], end)
+    _output(inner, output, alpha, False)
+    return True
 
 
 def _output(tree: bpy.types.NodeTree, name: str, source: bpy.types.NodeSocket, is_color: bool) -> None:

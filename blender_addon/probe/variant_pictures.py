@@ -24,6 +24,7 @@ from .graph_copy import own_copy, remove_copy, variant_of
 from .other_views import ELSEWHERE_SCALE, asks_ray, cosines_of, see_from_elsewhere
 from .server import ProbeRequestError
 from .target import (
+    ALPHA,
     DIRECTIONS,
     MASK,
     POSITION,
@@ -34,6 +35,7 @@ from .target import (
     looks_by_pixels,
     make_opaque,
     remove_outputs,
+    weigh_outputs,
     widen_bumps,
     write_outputs,
     write_weight,
@@ -45,6 +47,7 @@ MOST_VARIANTS = 32
 # Their own samples would blur a sharp highlight where they hardly scatter: 1.7 for 0.64 at its brightest, of a coat of
 # roughness 0.03 on a smooth bump
 APART = 2e-3
+LEAST_ALPHA = 1e-4  # of a sum over samples: less is nothing, and divides nothing
 
 Picture = NDArray[np.float32]
 _Found = dict[tuple[int, str] | str, Picture]  # by variant and socket; mask and position by their names
@@ -191,7 +194,7 @@ class VariantPictures:
             by_pixels = looks_by_pixels(copy, turned=bool(turned))
             if not by_pixels:
                 widen_bumps(base.node_tree, frame.scale)
-            wanted, kinds = [(MASK, False), (POSITION, True)], {}
+            wanted, kinds, alphas = [(MASK, False), (POSITION, True)], {}, dict[str, str]()
             for k, variant in enumerate(variants):
                 tree = variant_of(base.node_tree)
                 copy.node_tree.nodes.new("ShaderNodeGroup").node_tree = tree
@@ -201,11 +204,13 @@ class VariantPictures:
                 outputs = {name: _name(k, i) for i, name in enumerate(variant.names)}
                 kinds |= _put_outputs(tree, self.paths, outputs)
                 wanted += [(output, kinds[name] != "VALUE") for name, output in outputs.items()]
+                alphas |= _weigh(tree, self.paths, outputs)
+            wanted += [(output, False) for output in dict.fromkeys(alphas.values())]
             at_depths = peeled(copy.node_tree, wanted, depths[-1] + 1)
             outputs = partial(self.target.outputs, copy, frame=frame, by_pixels=by_pixels)
-            found = joined_depths(outputs(at_depths, samples=self.samples), wanted, depths)
+            found = _of_what_is_there(joined_depths(outputs(at_depths, samples=self.samples), wanted, depths), alphas)
             if turned and self.samples > 1:
-                single = joined_depths(outputs(at_depths, samples=1), wanted, depths)
+                single = _of_what_is_there(joined_depths(outputs(at_depths, samples=1), wanted, depths), alphas)
                 for k, each in enumerate(variants):
                     names = [_name(k, i) for i in range(len(each.names))]
                     found |= _of_one_sample(single, found, names, {name for name, _ in turned} & set(names))
@@ -232,8 +237,48 @@ def _of_one_sample(
     return found
 
 
+def _of_what_is_there(found: Mapping[str, Picture], alphas: Mapping[str, str]) -> dict[str, Picture]:
+    """Pictures of which those that were weighed with an alpha are means over what it leaves of the surface.
+
+    Where it leaves nothing, neighbours have the value: a ray may meet what no sample has.
+    """
+    own = dict(found)
+    for name, alpha in alphas.items():
+        picture, weight = found[name], np.maximum(found[alpha], 0.0)
+        near, near_weight = (_summed(each) for each in (picture, weight))
+        here = weight > SEEN * found[MASK]
+        mean = np.where(here, picture, near) / np.maximum(np.where(here, weight, near_weight), LEAST_ALPHA)
+        own[name] = (mean * found[MASK]).astype(np.float32)
+    return own
+
+
+def _summed(picture: Picture) -> Picture:
+    """The sum over each subpixel and the eight around it."""
+    padded = np.pad(picture, ((1, 1), (1, 1), (0, 0)))
+    rows, columns = picture.shape[:2]
+    return sum(padded[down : down + rows, right : right + columns] for down in range(3) for right in range(3))
+
+
+def _weigh(tree: bpy.types.NodeTree, paths: Mapping[str, Sequence[str]], outputs: Mapping[str, str]) -> dict[str, str]:
+    """Weigh outputs of a variant with the alpha of their shader where that has a link; returns its output by theirs.
+
+    A mean that holds what alpha takes away is too dark at the edges of leaves: pictures are black where they are clear.
+    """
+    by_shader: dict[tuple[str, ...], list[str]] = {}
+    for name, output in outputs.items():
+        *shader, socket = paths[name]
+        if socket and socket not in (*DIRECTIONS, ALPHA):
+            by_shader.setdefault(tuple(shader), []).append(output)
+    found: dict[str, str] = {}
+    for shader, own in by_shader.items():
+        alpha = f"{own[0]} alpha"
+        if weigh_outputs(tree, shader, own, alpha):
+            found |= dict.fromkeys(own, alpha)
+    return found
+
+
 def _outputs_of(variants: Sequence[Variant]) -> int:
-    return sum(len(variant.names) for variant in variants) + 2  # mask and position
+    return sum(len(variant.names) + 1 for variant in variants) + 2  # an alpha of each; mask and position
 
 
 def _name(variant: int, socket: int) -> str:

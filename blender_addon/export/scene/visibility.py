@@ -28,6 +28,12 @@ RAYS = 12  # along each side of the frame, where it is looked for what lies in o
 BEHIND = 1e-6
 MOST_BEHIND = 8  # surfaces on such a ray: two walls of a bottle, a drink in it, and what it stands on
 OUTSIDE = "The camera does not see '{obj}': move it into the frame."
+BEHIND_GLASS = (
+    "The camera sees '{obj}' through '{glass}' alone, and a fit looks at what is seen without glass before it: turn "
+    "Ray Visibility > Camera of '{glass}' off, and render the reference so."
+)
+BENDING = ("ShaderNodeBsdfGlass", "ShaderNodeBsdfRefraction")
+STRAIGHT = ("ShaderNodeBsdfTransparent", "ShaderNodeMixShader")  # by what else light may go through an object
 
 
 def check_visible(
@@ -55,18 +61,24 @@ def check_visible(
         return np.empty((0, 3))
     probed = inside[np.linspace(0, len(inside) - 1, min(len(inside), PROBES)).astype(int)]
     probed = np.random.default_rng(0).permutation(probed)  # the first few are of all faces
-    is_seen, blocker = False, ""
+    is_seen, is_plain, blocker, glass = False, False, "", ""
     for number, point in enumerate(probed):
         hit, face, gap = _first_hit(point, data, scene, depsgraph)
         if gap <= MET:
             seen.append(point)
         if hit is None or (hit.original == target and _is_of_slot(hit, face, slot)) or _lets_light_through(hit):
             is_seen = True
+            if hit is None or hit.original == target or not _bends_all_light(hit):
+                is_plain = True
+            else:
+                glass = hit.name
         else:
             blocker = hit.name
-        if is_seen and (number >= MOST_SEEN or len(seen) == MOST_SEEN):
+        if is_plain and (number >= MOST_SEEN or len(seen) == MOST_SEEN):
             break
-    if not is_seen:
+    if is_seen and not is_plain:
+        findings.error(BEHIND_GLASS.format(obj=target.name, glass=glass))
+    elif not is_seen:
         findings.error(f"The camera does not see '{target.name}': it is hidden behind '{blocker}'.")
     return np.array(seen).reshape(-1, 3)
 
@@ -170,6 +182,22 @@ def _first_hit(
         return None, face, np.inf
     there = data.origin + point
     return item, face, float(np.linalg.norm(np.array(place) - there) / max(np.linalg.norm(there - start), 1e-30))
+
+
+def _bends_all_light(item: bpy.types.Object) -> bool:
+    """Whether what is seen through `item` is seen through glass: no alpha and no transparency lets it straight on."""
+    if item.hide_render or not item.visible_camera:
+        return False
+    trees = [slot.material.node_tree for slot in item.material_slots if slot.material and slot.material.node_tree]
+    nodes = [node for tree in trees for node in tree.nodes]
+    alphas = [node.inputs.get("Alpha") for node in nodes]
+    if any(node.bl_idname in STRAIGHT for node in nodes):
+        return False
+    if any(alpha is not None and (alpha.is_linked or alpha.default_value != 1.0) for alpha in alphas):
+        return False
+    weights = [node.inputs.get("Transmission Weight") for node in nodes]
+    through = any(weight is not None and (weight.is_linked or weight.default_value > 0.0) for weight in weights)
+    return through or any(node.bl_idname in BENDING for node in nodes)
 
 
 def _lets_light_through(item: bpy.types.Object) -> bool:

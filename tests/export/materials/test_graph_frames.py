@@ -11,9 +11,9 @@ import pytest
 
 bpy = pytest.importorskip("bpy")
 
-from ..scenes import new_material  # noqa: E402
+from ..scenes import add_quad, new_material, world_color  # noqa: E402
 from .test_displacement import displace  # noqa: E402
-from .test_node_graphs import lit_scene, principled, recorded_and_cycles  # noqa: E402
+from .test_node_graphs import lit_scene, principled, recorded_and_cycles, renderer_and_cycles  # noqa: E402
 
 
 def striped(name: str = "Target") -> Any:
@@ -69,3 +69,20 @@ def test_the_picture_is_that_of_cycles_all_over_the_target(
     found, truth = recorded_and_cycles(export, render_cycles, build())
     assert abs(found.mean() / truth.mean() - 1.0) < 0.006
     assert np.sqrt(np.mean((found - truth) ** 2)) / truth.mean() < 0.06
+
+
+def test_what_is_behind_glass_has_its_own_colours(
+    scene: Any, export: Any, render_cycles: Callable[[], Any], mitsuba: Any
+) -> None:
+    """A table under a plate that bends nothing: below it the mean of black and white stood in."""
+    lit_scene(scene)
+    scene.cycles.samples = 256
+    scene.cycles.max_bounces = scene.cycles.diffuse_bounces = scene.cycles.transmission_bounces = 6
+    world_color(scene, 0.5)
+    table = add_quad("Table", 6.0, 0.0, striped())
+    clear = new_material("Clear", Base_Color=(1.0, 1.0, 1.0), Transmission_Weight=1.0, Roughness=0.0, IOR=1.0)
+    add_quad("Plate", 1.2, 0.4, clear)
+    renderer, truth = renderer_and_cycles(export, render_cycles, table)
+    found = np.mean([renderer.image(renderer.start, seed=seed, spp=64) for seed in range(2)], axis=0)
+    below = slice(16, 32), slice(16, 32)
+    assert np.sqrt(np.mean((found[below] - truth[below]) ** 2)) / truth[below].mean() < 0.2

@@ -87,3 +87,27 @@ def test_an_object_may_hide_its_own_slot(lit: Any, export: Any) -> None:
         export(target)
     target.active_material_index = 1
     export(target)
+
+
+@pytest.mark.parametrize(
+    ("sockets", "is_refused"),
+    [
+        ({"Transmission_Weight": 1.0}, True),
+        ({"Transmission_Weight": 1.0, "Alpha": 0.5}, False),
+        ({"Alpha": 0.5}, False),
+    ],
+    ids=["glass", "half clear glass", "half clear"],
+)
+def test_what_glass_covers_is_refused_by_its_name(
+    sockets: dict[str, float], is_refused: bool, lit: Any, export: Any
+) -> None:
+    """Such a fit ended with 'the camera does not see the target', which it does."""
+    target = add_quad("Target", 1.0, 0.0, new_material("Paint"))
+    glass = add_quad("Glass", 1.5, 1.0, new_material("Glass", **sockets))
+    if is_refused:
+        with pytest.raises(ExportError, match="The camera sees 'Target' through 'Glass' alone"):
+            export(target)
+        glass.visible_camera = False
+    export(target)
+    glass.visible_camera, glass.location.x = True, 1.0
+    export(target)  # a part of it lies beside the glass
