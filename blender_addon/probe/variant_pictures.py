@@ -256,7 +256,8 @@ def _summed(picture: Picture) -> Picture:
     """The sum over each subpixel and the eight around it."""
     padded = np.pad(picture, ((1, 1), (1, 1), (0, 0)))
     rows, columns = picture.shape[:2]
-    return sum(padded[down : down + rows, right : right + columns] for down in range(3) for right in range(3))
+    steps = [(down, right) for down in range(3) for right in range(3)]
+    return np.sum([padded[down : down + rows, right : right + columns] for down, right in steps], axis=0)
 
 
 def _weigh(tree: bpy.types.NodeTree, paths: Mapping[str, Sequence[str]], outputs: Mapping[str, str]) -> dict[str, str]:
