@@ -19,6 +19,7 @@ from numpy.typing import NDArray
 
 from ..export.camera.camera_model import Region
 from ..export.camera.render_region import region_settings, square_size
+from ..export.nodes.clear_objects import bends_light, nodes_of
 from ..versions import save_as_multilayer
 from .plain_exr import read_plain_exr
 
@@ -27,7 +28,6 @@ FILTER_MARGIN = 2.0  # pixels around the target: as far as a pixel filter looks
 MOST_AOV_BYTES = 2 * 10**9
 BYTES_PER_VALUE = 16
 LEAST_TRANSPARENT = 16  # surfaces that a ray may pass: those before the target, and its own
-BENDING = ("ShaderNodeBsdfGlass", "ShaderNodeBsdfRefraction")
 
 Bounds = tuple[int, int, int, int]  # left, top, right and bottom, in pixels of the picture
 
@@ -256,13 +256,7 @@ def _settings(scene: bpy.types.Scene, layer: bpy.types.ViewLayer, frame: Frame, 
 
 def _is_glass(item: bpy.types.Object) -> bool:
     """Whether light goes through an object by a bend, and nothing of it is looked at."""
-    trees = [slot.material.node_tree for slot in item.material_slots if slot.material and slot.material.node_tree]
-    nodes = [node for tree in trees for node in tree.nodes]
-    if any(node.bl_idname == "ShaderNodeOutputAOV" for node in nodes):
-        return False
-    weights = [node.inputs.get("Transmission Weight") for node in nodes]
-    through = any(weight is not None and (weight.is_linked or weight.default_value > 0.0) for weight in weights)
-    return through or any(node.bl_idname in BENDING for node in nodes)
+    return bends_light(item) and not any(node.bl_idname == "ShaderNodeOutputAOV" for node in nodes_of(item))
 
 
 def _joined(channels: dict[str, NDArray[np.float32]], name: str) -> NDArray[np.float32]:

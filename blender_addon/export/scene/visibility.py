@@ -15,6 +15,7 @@ from ..camera.camera_model import Camera
 from ..findings import Findings, Fix
 from ..fitted_slot import FittedSlot
 from ..meshes.mesh_arrays import Piece
+from ..nodes.clear_objects import bends_light, nodes_of, passes_light
 from ..render_state import instanced_objects, rendered_objects
 from .scene_data import SceneData
 
@@ -32,8 +33,7 @@ BEHIND_GLASS = (
     "The camera sees '{obj}' through '{glass}' alone, and a fit looks at what is seen without glass before it: turn "
     "Ray Visibility > Camera of '{glass}' off, and render the reference so."
 )
-BENDING = ("ShaderNodeBsdfGlass", "ShaderNodeBsdfRefraction")
-STRAIGHT = ("ShaderNodeBsdfTransparent", "ShaderNodeMixShader")  # by what else light may go through an object
+MIX = "ShaderNodeMixShader"  # whose other side may let light straight on
 
 
 def check_visible(
@@ -185,31 +185,12 @@ def _first_hit(
 
 
 def _bends_all_light(item: bpy.types.Object) -> bool:
-    """Whether what is seen through `item` is seen through glass: no alpha and no transparency lets it straight on."""
-    if item.hide_render or not item.visible_camera:
+    """Whether what is seen through `item` is seen through glass: nothing lets light straight on."""
+    if item.hide_render or not item.visible_camera or passes_light(item):
         return False
-    trees = [slot.material.node_tree for slot in item.material_slots if slot.material and slot.material.node_tree]
-    nodes = [node for tree in trees for node in tree.nodes]
-    alphas = [node.inputs.get("Alpha") for node in nodes]
-    if any(node.bl_idname in STRAIGHT for node in nodes):
-        return False
-    if any(alpha is not None and (alpha.is_linked or alpha.default_value != 1.0) for alpha in alphas):
-        return False
-    weights = [node.inputs.get("Transmission Weight") for node in nodes]
-    through = any(weight is not None and (weight.is_linked or weight.default_value > 0.0) for weight in weights)
-    return through or any(node.bl_idname in BENDING for node in nodes)
+    return bends_light(item) and not any(node.bl_idname == MIX for node in nodes_of(item))
 
 
 def _lets_light_through(item: bpy.types.Object) -> bool:
     """Whether something behind `item` may still be seen: its material transmits, or the render does not show it."""
-    if item.hide_render or not item.visible_camera:
-        return True
-    for slot in item.material_slots:
-        for node in slot.material.node_tree.nodes if slot.material and slot.material.node_tree else []:
-            if node.bl_idname in ("ShaderNodeBsdfTransparent", "ShaderNodeBsdfGlass", "ShaderNodeBsdfRefraction"):
-                return True
-            for name, opaque in (("Transmission Weight", 0.0), ("Alpha", 1.0)):
-                socket = node.inputs.get(name)
-                if socket is not None and (socket.is_linked or socket.default_value != opaque):
-                    return True
-    return False
+    return item.hide_render or not item.visible_camera or bends_light(item) or passes_light(item)
