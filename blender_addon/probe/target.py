@@ -19,6 +19,7 @@ from ..export.images.color_space import to_rec709
 from ..export.nodes.closure_leaves import OUTPUT
 from ..export.nodes.dependence import OF_FACING, asked_for
 from ..export.nodes.displacement import SHADING_NORMAL, bends_normals, moves_faces
+from ..export.nodes.leaf_kinds import TRANSPARENT
 from ..export.nodes.shader_graph import source_of
 from ..export.render_state import render_state
 from ..versions import active_output
@@ -229,17 +230,41 @@ def write_outputs(tree: bpy.types.NodeTree, path: list[str], outputs: Mapping[st
     return kinds
 
 
-def weigh_outputs(tree: bpy.types.NodeTree, path: Sequence[str], names: Sequence[str], output: str) -> bool:
-    """Multiply these outputs by the Alpha of their shader, and put one of the given name on that; False without a link.
+def hole_weight(closures: ClosureTree, path: list[str]) -> bpy.types.NodeSocket | None:
+    """The weight of a shader that is mixed with nothing but Transparent; None where no nodes give it, or of another.
 
-    They are in the shader's tree.
+    It is an output of the top tree.
+    """
+    own = [leaf.weight for leaf in closures.leaves if _path(leaf) == path]
+    others = [leaf.node.bl_idname for leaf in closures.leaves if _path(leaf) != path]
+    if len(own) != 1 or isinstance(own[0], float) or any(kind != TRANSPARENT for kind in others):
+        return None
+    return own[0]
+
+
+def weigh_outputs(
+    tree: bpy.types.NodeTree,
+    path: Sequence[str],
+    names: Sequence[str],
+    output: str,
+    weight: bpy.types.NodeSocket | None,
+) -> bool:
+    """Multiply these outputs by the Alpha of their shader and its `weight`; False where neither has a link.
+
+    They are in the shader's tree, as the weight is. One of the name `output` is put on what they are multiplied with.
     """
     inner, shader = node_at(tree, path)
     socket = shader.inputs.get(ALPHA)
     source = None if socket is None else source_of(socket)
-    if source is None:
+    alpha = weight if source is None else within_bounds(inner, shader, socket, source)
+    if alpha is None:
         return False
-    alpha = within_bounds(inner, shader, socket, source)
+    if source is not None and weight is not None:
+        both = inner.nodes.new("ShaderNodeMath")
+        both.operation = "MULTIPLY"
+        inner.links.new(alpha, both.inputs[0])
+        inner.links.new(weight, both.inputs[1])
+        alpha = both.outputs[0]
     for node in [node for node in inner.nodes if node.bl_idname == "ShaderNodeOutputAOV" and node.aov_name in names]:
         link = next(each for each in inner.links if each.to_node == node)
         is_color, value, end = link.to_socket.name == "Color", link.from_socket, link.to_socket

@@ -32,6 +32,7 @@ from .target import (
     Target,
     cleaned,
     from_origin,
+    hole_weight,
     looks_by_pixels,
     make_opaque,
     remove_outputs,
@@ -202,9 +203,10 @@ class VariantPictures:
                     see_from_elsewhere(tree, variant.cosine)
                 _put(tree, self.places, variant.values, material.name)
                 outputs = {name: _name(k, i) for i, name in enumerate(variant.names)}
-                kinds |= _put_outputs(tree, self.paths, outputs)
+                closures = ClosureTree(tree)  # of the surface that the outputs take the place of
+                kinds |= _put_outputs(tree, self.paths, outputs, closures)
                 wanted += [(output, kinds[name] != "VALUE") for name, output in outputs.items()]
-                alphas |= _weigh(tree, self.paths, outputs)
+                alphas |= _weigh(tree, self.paths, outputs, closures)
             wanted += [(output, False) for output in dict.fromkeys(alphas.values())]
             at_depths = peeled(copy.node_tree, wanted, depths[-1] + 1)
             outputs = partial(self.target.outputs, copy, frame=frame, by_pixels=by_pixels)
@@ -260,8 +262,11 @@ def _summed(picture: Picture) -> Picture:
     return np.sum([padded[down : down + rows, right : right + columns] for down, right in steps], axis=0)
 
 
-def _weigh(tree: bpy.types.NodeTree, paths: Mapping[str, Sequence[str]], outputs: Mapping[str, str]) -> dict[str, str]:
-    """Weigh outputs of a variant with the alpha of their shader where that has a link; returns its output by theirs.
+def _weigh(
+    tree: bpy.types.NodeTree, paths: Mapping[str, Sequence[str]], outputs: Mapping[str, str], closures: ClosureTree
+) -> dict[str, str]:
+    """Weigh outputs of a variant with the alpha of their shader where that has a link, and with its weight where the
+    rest is clear; returns the output of that by theirs.
 
     A mean that holds what alpha takes away is too dark at the edges of leaves: pictures are black where they are clear.
     """
@@ -273,7 +278,8 @@ def _weigh(tree: bpy.types.NodeTree, paths: Mapping[str, Sequence[str]], outputs
     found: dict[str, str] = {}
     for shader, own in by_shader.items():
         alpha = f"{own[0]} alpha"
-        if weigh_outputs(tree, shader, own, alpha):
+        weight = hole_weight(closures, list(shader)) if len(shader) == 1 else None  # of the tree that it is in
+        if weigh_outputs(tree, shader, own, alpha, weight):
             found |= dict.fromkeys(own, alpha)
     return found
 
@@ -297,10 +303,9 @@ def _put(tree: bpy.types.NodeTree, places: Sequence[Place], values: Sequence[Any
 
 
 def _put_outputs(
-    tree: bpy.types.NodeTree, paths: Mapping[str, Sequence[str]], outputs: Mapping[str, str]
+    tree: bpy.types.NodeTree, paths: Mapping[str, Sequence[str]], outputs: Mapping[str, str], closures: ClosureTree
 ) -> dict[str, str]:
     """Put an output node of the given name on each of these sockets of a variant; returns the sockets' types."""
-    closures = ClosureTree(tree) if not all(paths[name][-1] for name in outputs) else None
     remove_outputs(tree)
     for node in [node for node in tree.nodes if node.bl_idname == "ShaderNodeOutputMaterial"]:
         tree.nodes.remove(node)
@@ -310,6 +315,5 @@ def _put_outputs(
         if socket:
             kinds[name] = write_outputs(tree, shader, {socket: output})[socket]
         else:
-            assert closures is not None
             kinds[name] = write_weight(tree, closures, shader, output)
     return kinds

@@ -11,6 +11,8 @@ import pytest
 
 bpy = pytest.importorskip("bpy")
 
+from blender_addon.versions import active_output  # noqa: E402
+
 from ..scenes import add_quad, new_material, world_color  # noqa: E402
 from .test_node_graphs import lit_scene, principled, renderer_and_cycles  # noqa: E402
 
@@ -30,8 +32,9 @@ def lace() -> Any:
     return image
 
 
+@pytest.mark.parametrize("cut", ["alpha", "transparent", "both"])
 def test_holes_take_nothing_of_a_tinted_picture(
-    scene: Any, export: Any, render_cycles: Callable[[], Any], mitsuba: Any
+    cut: str, scene: Any, export: Any, render_cycles: Callable[[], Any], mitsuba: Any
 ) -> None:
     """A card in front of a dark floor; means that held the black of the holes made it 3.4 % too dark."""
     lit_scene(scene)
@@ -43,7 +46,14 @@ def test_holes_take_nothing_of_a_tinted_picture(
     picture.image, tint.inputs["Value"].default_value = lace(), 0.9
     tree.links.new(picture.outputs["Color"], tint.inputs["Color"])
     tree.links.new(tint.outputs["Color"], shader.inputs["Base Color"])
-    tree.links.new(picture.outputs["Alpha"], shader.inputs["Alpha"])
+    if cut != "transparent":
+        tree.links.new(picture.outputs["Alpha"], shader.inputs["Alpha"])
+    if cut != "alpha":
+        mix, clear = tree.nodes.new("ShaderNodeMixShader"), tree.nodes.new("ShaderNodeBsdfTransparent")
+        tree.links.new(picture.outputs["Alpha"], mix.inputs[0])
+        tree.links.new(clear.outputs[0], mix.inputs[1])
+        tree.links.new(shader.outputs[0], mix.inputs[2])
+        tree.links.new(mix.outputs[0], active_output(tree).inputs["Surface"])
     add_quad("Floor", 6.0, -1.0, new_material("Floor", Base_Color=(0.05, 0.05, 0.05)))
     card = add_quad("Card", 2.0, 0.0, material)
     card.data.uv_layers.new()
