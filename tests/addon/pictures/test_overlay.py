@@ -109,7 +109,9 @@ def test_a_large_picture_has_no_more_pixels_than_a_view(scene: SimpleNamespace, 
     seen = painted(scene)
     assert seen.shape == (1365, 2048, 4)
     # NumPy's comparison: that of pytest takes eight million numbers one by one, for most of a minute
-    np.testing.assert_allclose(seen[..., :3], np.broadcast_to(np.array([30, 60, 90]) / 255, (1365, 2048, 3)), atol=0.003)
+    np.testing.assert_allclose(
+        seen[..., :3], np.broadcast_to(np.array([30, 60, 90]) / 255, (1365, 2048, 3)), atol=0.003
+    )
 
 
 def test_a_line_is_dragged_without_new_paint(shown: SimpleNamespace, monkeypatch: pytest.MonkeyPatch) -> None:
