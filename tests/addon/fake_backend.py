@@ -120,7 +120,7 @@ def main(arguments: list[str]) -> int:
         os.abort()
     png(pictures / "reference.png", (180, 60, 40))
     say(event="started", stages=STAGES, parameters=list(RECOVERED), seconds=0.1)
-    pause, steps = control.get("seconds", 0.2) / (STEPS * len(STAGES)), STEPS * len(STAGES)
+    pause, steps = control.get("seconds", 0.05) / (STEPS * len(STAGES)), STEPS * len(STAGES)
     for i in range(steps):
         stage = STAGES[i // STEPS]
         fraction = (i + 1) / steps

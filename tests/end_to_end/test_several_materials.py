@@ -150,11 +150,11 @@ def test_both_are_found_in_each_others_light_and_written_in_one_go(corner: Path,
         assert written[found["object"]] == pytest.approx(found["recovered"]["base_color"], abs=1e-5)
 
 
-def test_what_cannot_be_is_said_before_the_fit(corner: Path, tmp_path: Path) -> None:
+def test_what_cannot_be_is_said_before_the_fit(corner: Path, mfo_here: MfoHere, tmp_path: Path) -> None:
     words = ["blend", corner / "start.blend", "--reference", corner / "reference.exr", "--out", tmp_path / "job"]
-    twice = run_mfo(*words, "--object", "Floor", "--object", "Floor@slot=1")
+    twice = mfo_here(*words, "--object", "Floor", "--object", "Floor@slot=1")
     assert (twice.code, twice.sentence.endswith("is named twice: name it once.")) == (2, True)
-    paper = run_mfo(*words, "--object", "Floor", "--object", "Wall", "--preset", "paper")
+    paper = mfo_here(*words, "--object", "Floor", "--object", "Wall", "--preset", "paper")
     assert paper.code == 2
     assert "The preset 'paper' fits one material alone" in paper.sentence
     assert not (tmp_path / "job").exists()
