@@ -10,12 +10,16 @@ import json
 import os
 import subprocess
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import pytest
+
+from mfo_backend.cli import blender_host
+from mfo_backend.cli.main import main
 
 ROOT = Path(__file__).resolve().parents[2]
 SIZE = 64
@@ -67,6 +71,34 @@ def run_headless(*words: object) -> Done:
     with contextlib.redirect_stdout(io.StringIO()) as said:
         code = headless.main([str(word) for word in words])
     return Done(code, said.getvalue(), "")
+
+
+@pytest.fixture
+def blender_here(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Blender's part of `mfo` runs in this process, where that runs here, too."""
+
+    def in_this_process(words: Sequence[str], **_: object) -> subprocess.CompletedProcess[str]:
+        done = run_headless(*words[list(words).index(blender_host.MODULE) + 1 :])
+        return subprocess.CompletedProcess(words, done.code, done.stdout, done.stderr)
+
+    monkeypatch.setattr(blender_host, "subprocess", SimpleNamespace(run=in_this_process))
+
+
+@pytest.fixture
+def mfo_here(blender_here: None) -> Callable[..., Done]:
+    """`run_mfo` without a process of its own, for a job that is written to `--out`.
+
+    Each file has a test with processes; to start two or three more for every case takes as long as its fit.
+    """
+
+    def run(*arguments: object) -> Done:
+        words = [str(word) for word in arguments if word != "--json"]  # which takes the stdout of its process
+        result = Path(words[words.index("--out") + 1], "result.json")
+        with contextlib.redirect_stdout(io.StringIO()), contextlib.redirect_stderr(io.StringIO()) as said:
+            code = main(words)
+        return Done(code, result.read_text("utf-8") if result.is_file() else "", said.getvalue())
+
+    return run
 
 
 # one render, written in three ways

@@ -4,19 +4,16 @@
 from __future__ import annotations
 
 import hashlib
-import subprocess
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from pathlib import Path
-from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
-from mfo_backend.cli import blender_host
 from mfo_backend.cli.main import main
 from mfo_backend.scene.image_file import write_exr
 
-from .conftest import SIZE, Done, Scene, run_bpy, run_headless, run_mfo
+from .conftest import SIZE, Done, Scene, run_bpy, run_mfo
 
 HEAD = "bpy.data.objects['Suzanne']"
 # name -> (what is done to the .blend, words of the sentence)
@@ -42,14 +39,8 @@ Blend = Callable[..., Done]
 
 
 @pytest.fixture
-def blend(scene: Scene, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch) -> Blend:
+def blend(scene: Scene, capsys: pytest.CaptureFixture[str], blender_here: None) -> Blend:
     """Run `mfo blend` on the start with further arguments, in this process; so does Blender's part."""
-
-    def in_this_process(words: Sequence[str], **_: object) -> subprocess.CompletedProcess[str]:
-        done = run_headless(*words[list(words).index(blender_host.MODULE) + 1 :])
-        return subprocess.CompletedProcess(words, done.code, done.stdout, done.stderr)
-
-    monkeypatch.setattr(blender_host, "subprocess", SimpleNamespace(run=in_this_process))
 
     def call(reference: Path, *arguments: object, file: Path = scene.start) -> Done:
         words = ["blend", file, "--object", scene.object, "--reference", reference, *arguments]

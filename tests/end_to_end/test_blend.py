@@ -18,6 +18,18 @@ from mfo_backend.scene.image_file import read_image, write_exr, write_png
 from .conftest import RENDER, SIZE, Done, Fitted, Scene, run_bpy, run_mfo
 
 Blend = Callable[..., Done]
+
+
+@pytest.fixture
+def blend_here(scene: Scene, mfo_here: Blend) -> Blend:
+    """`blend` without processes of its own, for other pictures and settings."""
+
+    def call(reference: Path, *arguments: object) -> Done:
+        return mfo_here("blend", scene.start, "--object", scene.object, "--reference", reference, *arguments)
+
+    return call
+
+
 OPAQUE = ("base_color", "metallic", "roughness", "specular_ior_level", "specular_tint", "coat_weight", "coat_roughness",
           "sheen_weight", "sheen_roughness", "sheen_tint")  # fmt: skip
 SHOW = """
@@ -47,8 +59,8 @@ def test_linear_reference_is_recovered_and_applied(scene: Scene, fitted: Fitted)
     assert "Roughness" in (fitted.job / "index.html").read_text("utf-8").title()
 
 
-def test_display_picture_is_recovered(scene: Scene, blend: Blend, tmp_path: Path) -> None:
-    done = blend(scene.png, "--out", tmp_path / "job", "--preset", "fast", "--json")
+def test_display_picture_is_recovered(scene: Scene, blend_here: Blend, tmp_path: Path) -> None:
+    done = blend_here(scene.png, "--out", tmp_path / "job", "--preset", "fast", "--json")
     assert done.code == 0, done.stderr
     start, result = done.answer["errors"]["flip"]
     assert result < 0.06  # as above
@@ -82,8 +94,8 @@ def test_agx_picture_is_recovered_through_its_view(scene: Scene, blend: Blend, a
     assert np.abs(shown - reference).mean() < 0.014
 
 
-def test_paper_preset_lowers_flip_after_mse(scene: Scene, blend: Blend, tmp_path: Path) -> None:
-    done = blend(
+def test_paper_preset_lowers_flip_after_mse(scene: Scene, blend_here: Blend, tmp_path: Path) -> None:
+    done = blend_here(
         scene.exr, "--out", tmp_path / "job", "--preset", "paper", "--parameters", "reduced", "--spp", 4,
         "--max-iterations", 150, "--json",
     )  # fmt: skip
@@ -108,7 +120,7 @@ def test_demo_judges_in_cycles(tmp_path: Path) -> None:
     assert np.isfinite(pictures[1].pixels).all()
 
 
-def test_what_the_mask_leaves_out_has_no_part_in_the_fit(scene: Scene, blend: Blend, tmp_path: Path) -> None:
+def test_what_the_mask_leaves_out_has_no_part_in_the_fit(scene: Scene, blend_here: Blend, tmp_path: Path) -> None:
     """Something is in front of a quarter of the picture: under the mask the result is that of the whole picture."""
     # of a quarter of the noise: with that of 64 samples three quarters of the pixels are 0.061 from the reference
     calm = tmp_path / "calm.exr"
@@ -121,9 +133,9 @@ def test_what_the_mask_leaves_out_has_no_part_in_the_fit(scene: Scene, blend: Bl
     write_png(tmp_path / "mask.png", (~covered).astype(np.float32))
     # those of `all` by name: a picture that does not match asks for no fits from other classes of material
     options = ("--preset", "fast", "--parameters", ", ".join(OPAQUE), "--json")
-    blind = blend(tmp_path / "covered.exr", "--out", tmp_path / "blind", *options).answer
+    blind = blend_here(tmp_path / "covered.exr", "--out", tmp_path / "blind", *options).answer
     assert blind["verdict"] == "different"
-    seeing = blend(tmp_path / "covered.exr", "--mask", tmp_path / "mask.png", "--out", tmp_path / "job", *options)
+    seeing = blend_here(tmp_path / "covered.exr", "--mask", tmp_path / "mask.png", "--out", tmp_path / "job", *options)
     assert seeing.code == 0, seeing.stderr
     assert seeing.answer["errors"]["flip"][1] < 0.06  # as above
     assert seeing.answer["difference"]["target"]["shared_at_least"] < 0.01
@@ -133,7 +145,7 @@ def test_what_the_mask_leaves_out_has_no_part_in_the_fit(scene: Scene, blend: Bl
     assert not np.allclose(shown[~covered], NOT_COUNTED, atol=1 / 255)
 
 
-def test_a_mask_beside_the_object_is_refused(scene: Scene, blend: Blend, tmp_path: Path) -> None:
-    done = blend(scene.exr, "--crop", "0,0,4,4", "--out", tmp_path / "job")
+def test_a_mask_beside_the_object_is_refused(scene: Scene, blend_here: Blend, tmp_path: Path) -> None:
+    done = blend_here(scene.exr, "--crop", "0,0,4,4", "--out", tmp_path / "job")
     assert done.code == 2
     assert "shows nothing of the target" in done.sentence

@@ -3,12 +3,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
 import pytest
 
-from .conftest import run_bpy, run_mfo
+from .conftest import Done, run_bpy, run_mfo
 
 BUILD = """
 from studies.graphs.measure import build_scene
@@ -101,11 +102,11 @@ def test_stops_of_a_ramp_are_found_and_applied(ramp: Ramp, tmp_path: Path) -> No
 
 
 @pytest.mark.parametrize("by", ["alpha", "transparent"])
-def test_stops_of_what_has_holes_are_found_and_applied(by: str, tmp_path: Path) -> None:
+def test_stops_of_what_has_holes_are_found_and_applied(by: str, mfo_here: Callable[..., Done], tmp_path: Path) -> None:
     """Half of a head is cut out, so that its inside is seen."""
     start, picture, saved = tmp_path / "start.blend", tmp_path / "front.exr", tmp_path / "saved.blend"
     run_bpy(BUILD.replace("stops =", f"{HOLES}stops =", 1), start, picture, by)
-    done = run_mfo(
+    done = mfo_here(
         "blend", start, "--object", "Suzanne", "--reference", picture, "--parameters", "Color Ramp/Stop 0, Color "
         "Ramp/Stop 1", "--preset", "fast", "--out", tmp_path / "job", "--apply", "--save-as", saved, "--json",
     )  # fmt: skip
@@ -115,11 +116,11 @@ def test_stops_of_what_has_holes_are_found_and_applied(by: str, tmp_path: Path) 
     assert high == pytest.approx([0.05, 0.2, 0.7, 1.0], abs=0.05)
 
 
-def test_two_pictures_of_values_inside_nodes(ramp: Ramp, tmp_path: Path) -> None:
+def test_two_pictures_of_values_inside_nodes(ramp: Ramp, mfo_here: Callable[..., Done], tmp_path: Path) -> None:
     """Another camera, frame and size: what nodes give is evaluated for each, and both say one set of values."""
     start, side = tmp_path / "start.blend", tmp_path / "side.exr"
     run_bpy(SIDE, ramp.start, side, start)
-    done = run_mfo(
+    done = mfo_here(
         "blend", start, "--object", "Suzanne",
         "--reference", ramp.picture, "--reference", f"{side}@camera=Side,frame=9",
         "--parameters", "Color Ramp/Stop 0, Color Ramp/Stop 1", "--preset", "fast", "--out", tmp_path / "job", "--json",

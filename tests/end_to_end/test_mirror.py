@@ -29,11 +29,12 @@ bpy.ops.render.render(write_still=True)
 
 @pytest.mark.parametrize("roughness", [0.0, 0.1])
 def test_chrome_is_recovered_without_roughness(
-    scene: Scene, blend: Callable[..., Done], tmp_path: Path, roughness: float
+    scene: Scene, mfo_here: Callable[..., Done], tmp_path: Path, roughness: float
 ) -> None:
     reference = tmp_path / "metal.exr"
     run_bpy(METAL, scene.truth, reference, roughness)
-    done = blend(reference, "--out", tmp_path / "job", "--json")
+    words = ("--object", scene.object, "--reference", reference, "--out", tmp_path / "job")
+    done = mfo_here("blend", scene.start, *words)
     assert done.code == 0, done.stderr
     assert done.answer["verdict"] == "same"
     assert done.answer["recovered"]["metallic"] > 0.97

@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
@@ -11,7 +12,9 @@ import pytest
 
 from blender_addon.result.job_result import read_job_result
 
-from .conftest import run_bpy, run_mfo
+from .conftest import Done, run_bpy, run_mfo
+
+MfoHere = Callable[..., Done]
 
 SIZE = 48
 # a corner of two large walls under one lamp: half of the light on each comes over the other
@@ -147,11 +150,11 @@ def test_both_are_found_in_each_others_light_and_written_in_one_go(corner: Path,
         assert written[found["object"]] == pytest.approx(found["recovered"]["base_color"], abs=1e-5)
 
 
-def test_what_cannot_be_is_said_before_the_fit(corner: Path, tmp_path: Path) -> None:
+def test_what_cannot_be_is_said_before_the_fit(corner: Path, mfo_here: MfoHere, tmp_path: Path) -> None:
     words = ["blend", corner / "start.blend", "--reference", corner / "reference.exr", "--out", tmp_path / "job"]
-    twice = run_mfo(*words, "--object", "Floor", "--object", "Floor@slot=1")
+    twice = mfo_here(*words, "--object", "Floor", "--object", "Floor@slot=1")
     assert (twice.code, twice.sentence.endswith("is named twice: name it once.")) == (2, True)
-    paper = run_mfo(*words, "--object", "Floor", "--object", "Wall", "--preset", "paper")
+    paper = mfo_here(*words, "--object", "Floor", "--object", "Wall", "--preset", "paper")
     assert paper.code == 2
     assert "The preset 'paper' fits one material alone" in paper.sentence
     assert not (tmp_path / "job").exists()
@@ -210,11 +213,11 @@ for name in ("Floor", "Wall"):
 INSIDE = {"Floor": ((0.75, 0.2, 0.1), (0.1, 0.4, 0.1)), "Wall": ((0.25, 0.6, 0.8), (0.7, 0.6, 0.1))}
 
 
-def test_colours_inside_the_nodes_of_both_are_found_and_written(tmp_path: Path) -> None:
+def test_colours_inside_the_nodes_of_both_are_found_and_written(mfo_here: MfoHere, tmp_path: Path) -> None:
     """In two pictures, the first of which does not show the wall; the group that both have becomes one for each."""
     start, both, side, saved = (tmp_path / name for name in ("start.blend", "both.exr", "side.exr", "fitted.blend"))
     run_bpy(BUILD, start, both, side, "patterned")
-    done = run_mfo(
+    done = mfo_here(
         "blend", start, "--object", "Floor", "--object", "Wall", "--preset", "fast", "--parameters",
         "roughness, Group/Low, Wall Paint/Mix/B, Floor Paint/Mix/B",
         "--reference", f"{side}@camera=Side", "--reference", f"{both}@camera=Camera",
@@ -233,11 +236,11 @@ def test_colours_inside_the_nodes_of_both_are_found_and_written(tmp_path: Path) 
             assert value == pytest.approx(found["recovered"][name], abs=1e-5)
 
 
-def test_a_material_whose_nodes_cycles_evaluates_is_in_one_of_the_pictures(tmp_path: Path) -> None:
+def test_a_material_whose_nodes_cycles_evaluates_is_in_one_of_the_pictures(mfo_here: MfoHere, tmp_path: Path) -> None:
     """The first picture does not show it, and has its light: of a Mix of equal shares the floor would be too dark."""
     start, both, side, saved = (tmp_path / name for name in ("start.blend", "both.exr", "side.exr", "fitted.blend"))
     run_bpy(BUILD, start, both, side, "mixed")
-    done = run_mfo(
+    done = mfo_here(
         "blend", start, "--object", "Floor", "--object", "Wall", "--preset", "fast", "--parameters",
         "base_color, roughness", "--reference", f"{side}@camera=Side", "--reference", f"{both}@camera=Camera",
         "--out", tmp_path / "job", "--apply", "--save-as", saved, "--json",
@@ -255,9 +258,9 @@ def test_a_material_whose_nodes_cycles_evaluates_is_in_one_of_the_pictures(tmp_p
         assert written[found["object"]] == pytest.approx(found["recovered"]["base_color"], abs=1e-5)
 
 
-def test_one_material_is_fitted_to_the_pictures_that_show_it(corner: Path, tmp_path: Path) -> None:
+def test_one_material_is_fitted_to_the_pictures_that_show_it(corner: Path, mfo_here: MfoHere, tmp_path: Path) -> None:
     """The first of two pictures shows nothing of the wall."""
-    done = run_mfo(
+    done = mfo_here(
         "blend", corner / "start.blend", "--object", "Wall", "--parameters", "base_color", "--preset", "fast",
         "--reference", f"{corner / 'side.exr'}@camera=Side", "--reference", f"{corner / 'reference.exr'}@camera=Camera",
         "--out", tmp_path / "job", "--json",

@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -76,9 +77,12 @@ def test_two_pictures_are_fitted_at_once_and_each_has_its_verdict(turned: Turned
     assert f"Picture 2 ({turned.side.name})" in report
 
 
-def test_what_is_wrong_with_a_picture_is_said_before_the_fit(turned: Turned, scene: Scene, tmp_path: Path) -> None:
+def test_what_is_wrong_with_a_picture_is_said_before_the_fit(
+    turned: Turned, scene: Scene, mfo_here: Callable[..., Done], tmp_path: Path
+) -> None:
     late = f"{turned.side}@frame=99"
-    done = blend(turned, scene, "--reference", scene.exr, "--reference", late, "--out", tmp_path / "job")
+    words = ("--object", scene.object, "--reference", scene.exr, "--reference", late, "--out", tmp_path / "job")
+    done = mfo_here("blend", turned.start, *words)
     assert done.code == 2
     assert "Picture 2 (side.exr): Frame 99 is outside of the frames 1 to 10" in done.sentence
     assert not (tmp_path / "job").exists()

@@ -17,7 +17,7 @@ from blender_addon.probe.aov_render import frame_of, render_outputs, world_to_fr
 @pytest.fixture
 def scene() -> Any:
     """A square of 2 units in an orthographic picture of 10 units and 100 pixels, right and above of the middle."""
-    bpy.ops.wm.read_factory_settings(use_empty=True)
+    bpy.ops.wm.read_homefile(use_factory_startup=True, use_empty=True)
     scene = bpy.context.scene
     scene.render.resolution_x = scene.render.resolution_y = 100
     scene.render.resolution_percentage = 100

@@ -14,7 +14,7 @@ from blender_addon.probe.closure_tree import ClosureTree  # noqa: E402
 
 @pytest.fixture
 def tree() -> Any:
-    bpy.ops.wm.read_factory_settings(use_empty=True)
+    bpy.ops.wm.read_homefile(use_factory_startup=True, use_empty=True)
     material = bpy.data.materials.new("Target")
     if material.node_tree is None:
         material.use_nodes = True

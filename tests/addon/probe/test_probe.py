@@ -132,7 +132,7 @@ def test_a_second_blender_that_hangs_is_ended_and_said(
 ) -> None:
     script = f"import time; {says}time.sleep(60)"
     monkeypatch.setattr("blender_addon.probe.client.own_blender", lambda *_: [sys.executable, "-c", script])
-    monkeypatch.setattr("blender_addon.probe.client.ANSWER_SECONDS", 3.0)
+    monkeypatch.setattr("blender_addon.probe.client.ANSWER_SECONDS", 1.0)
     start = time.monotonic()
     with Probe() as probe:
         with pytest.raises(ProbeError, match=r"has not answered for .* and was ended: try again"):

@@ -11,6 +11,7 @@ import bpy
 import numpy as np
 import pytest
 
+from blender_addon.export.scene import scene_bakes
 from mfo_backend.scene.image_file import read_image
 from studies.parity.cycles_parity import render_job
 
@@ -83,15 +84,17 @@ def test_a_normal_map_on_instances_of_other_sizes_shares_a_bake_and_on_stretched
     assert _references(export(target)) == ["baked_0001", "baked_0001", "baked_0002", "baked_0003"]
 
 
-def test_bumps_on_instances_of_many_sizes_are_baked_for_some_and_named(stage: Any, export: Any) -> None:
-    from blender_addon.export.scene.scene_bakes import MOST_PLACES
-
+def test_bumps_on_instances_of_many_sizes_are_baked_for_some_and_named(
+    stage: Any, export: Any, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    most = 2
+    monkeypatch.setattr(scene_bakes, "MOST_PLACES", most)
     target, ball, nodes = stage
     _bump(nodes)
-    _instances(ball, *((0.5 + 0.1 * number,) * 3 for number in range(MOST_PLACES + 2)))
+    _instances(ball, *((0.5 + 0.1 * number,) * 3 for number in range(most + 2)))
     report = export(target)
-    assert _references(report) == [f"baked_{number + 1:04d}" for number in range(MOST_PLACES)] + ["baked_0001"] * 2
-    said = f"beyond {MOST_PLACES} sizes all have those of the first."
+    assert _references(report) == [f"baked_{number + 1:04d}" for number in range(most)] + ["baked_0001"] * 2
+    said = f"beyond {most} sizes all have those of the first."
     assert [said in note for note in report.notes].count(True) == 1
 
 

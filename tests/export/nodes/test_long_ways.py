@@ -27,7 +27,7 @@ def rerouted(tree: Any, output: Any, count: int) -> Any:
 def looks(count: int, monkeypatch: pytest.MonkeyPatch) -> int:
     """How often a socket is asked for its links, for which Blender looks through the tree, on ways of so many steps:
     before a value, within a group before its input, and before a mix's factor and shader."""
-    bpy.ops.wm.read_factory_settings(use_empty=True)
+    bpy.ops.wm.read_homefile(use_factory_startup=True, use_empty=True)
     material = new_material("Target")
     tree = material.node_tree
     output = tree.get_output_node("CYCLES").inputs["Surface"]

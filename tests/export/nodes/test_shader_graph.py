@@ -22,7 +22,7 @@ LUMINANCE = RGB @ [0.2126, 0.7152, 0.0722]  # ITU-R BT.709
 
 @pytest.fixture
 def tree() -> Any:
-    bpy.ops.wm.read_factory_settings(use_empty=True)
+    bpy.ops.wm.read_homefile(use_factory_startup=True, use_empty=True)
     return new_material("Target").node_tree
 
 
