@@ -49,7 +49,7 @@ SETTINGS = {
     ("ShaderNodeTexNoise", "Detail"): Range(0.0, 15.0, step=ROUGH_STEP),
     ("ShaderNodeTexNoise", "Distortion"): Range(-2.0, 2.0, step=ROUGH_STEP),
 }
-# Inputs by which a node passes amounts on: what comes out is a sum or a multiple of them. So is the value of a socket
+# Inputs by which a node passes amounts on: what comes out is a sum or a multiple of them, and so is what a socket gets
 # that nothing else lies before
 AMOUNTS = {
     "ShaderNodeMapRange": ("To Min", "To Max"),
@@ -61,6 +61,8 @@ AMOUNTS = {
     "ShaderNodeCombineColor": ("Red", "Green", "Blue"),
 }
 OF_SUMS, OF_PRODUCTS = ("ADD", "SUBTRACT", "MULTIPLY_ADD"), ("MULTIPLY", "DIVIDE")
+# Nodes whose own numbers are dials. Those of Math are none: a picture with a factor stays one, and 1 - x an inverse
+DIALS = ("ShaderNodeGroup", "ShaderNodeValue", "ShaderNodeMapRange", "ShaderNodeMix", "ShaderNodeMixRGB")
 LEFT_OUT = (("ShaderNodeBump", "Filter Width"),)  # how nodes are sampled, and not what they show
 DIRECTION = ("ShaderNodeNormalMap", "Color")  # an input whose colour is a direction
 SCALES = ("Scale", "Distance", "Lacunarity", "Brick Width", "Row Height", "Detail Scale")
@@ -92,9 +94,9 @@ def amounts_of(node: bpy.types.Node) -> tuple[str, ...]:
     return AMOUNTS.get(node.bl_idname, ())
 
 
-def range_of_amount(node: bpy.types.Node, value: float) -> Range:
-    """The range of a number that a socket of the target gets, or a part of it: about what a socket may hold."""
-    operation = getattr(node, "operation", None)
+def range_of_amount(fed: bpy.types.Node, value: float) -> Range:
+    """The range of a number that a socket of the target gets, or a part of it; `fed` is the node that takes it."""
+    operation = getattr(fed, "operation", None)
     if operation in OF_PRODUCTS and 0.0 <= value <= 1.0:
         return Range(0.0, 2.0, SETTING)
     if operation in OF_SUMS and -1.0 <= value <= 1.0:

@@ -21,6 +21,7 @@ from . import ranges
 from .place import CURVE_POINT, INPUT, OUTPUT, STOP_COLOR, STOP_POSITION, Place, Value, read
 from .ranges import (
     COLOR,
+    DIALS,
     GAIN,
     NUMBER,
     OFFSET,
@@ -335,7 +336,7 @@ def _finished(met: _Met, tree: bpy.types.NodeTree) -> GraphValue:
     value = read(tree, place)
     numbers = value if isinstance(value, tuple) else (value,)
     limits = met.range or plain_range(numbers[0])
-    if met.is_amount and limits.group == NUMBER:
+    if met.is_amount and limits.group == NUMBER and met.node.bl_idname in DIALS:
         limits = range_of_amount(met.fed or met.node, numbers[0])
     limits = replace(limits, lower=min(limits.lower, *numbers, limits.upper), upper=max(limits.upper, *numbers))
     label, inside = one_word(met.label or met.node.label or met.node.name), one_word(met.inside)

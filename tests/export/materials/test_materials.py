@@ -128,7 +128,7 @@ def test_pictures_stay_linked(scene: Any, export: Any, mitsuba: Any) -> None:
         assert pixels.shape == (2, 4, len(value))
         np.testing.assert_allclose(pixels[0, 0], value, atol=0.003)  # 8 bits
         np.testing.assert_allclose(sockets[name]["value"], value if len(value) == 3 else value[0], atol=0.003)
-    assert sockets["Sheen Weight"] == {"value": pytest.approx(0.3), "linked": True}
+    assert sockets["Sheen Weight"] == {"value": pytest.approx(0.3), "linked": True, "graph": "graph/socket_00.npy"}
     assert sockets["IOR"]["linked"] is False
     scene_read = load_scene(mitsuba, report, optimize=False)
     parameters = mitsuba.traverse(scene_read)
