@@ -16,7 +16,7 @@ Rows = NDArray[np.float32]
 
 
 LARGEST_TILE = 8  # pixels: the largest tile
-LEAST_BLOCKS = 6  # of a picture of which some pixels are looked at. No measurement
+LEAST_CHOSEN = 6  # blocks of a picture of which some are looked at. No measurement
 CHANNELS = 3  # of a tile follow each other and share its noise
 
 
@@ -113,7 +113,7 @@ def _some_blocks(mask: NDArray[np.bool_], most: int) -> NDArray[np.bool_]:
     padded = np.zeros((rows * LARGEST_TILE, columns * LARGEST_TILE), bool)
     padded[: mask.shape[0], : mask.shape[1]] = mask
     filled = np.flatnonzero(padded.reshape(rows, LARGEST_TILE, columns, LARGEST_TILE).any(axis=(1, 3)).ravel())
-    wanted = min(max(round(len(filled) * most / count), LEAST_BLOCKS), len(filled))
+    wanted = min(max(round(len(filled) * most / count), LEAST_CHOSEN), len(filled))
     chosen = np.zeros(rows * columns, bool)
     chosen[filled[np.linspace(0, len(filled) - 1, wanted).astype(int)]] = True
     whole = np.repeat(np.repeat(chosen.reshape(rows, columns), LARGEST_TILE, 0), LARGEST_TILE, 1)

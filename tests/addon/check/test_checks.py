@@ -240,7 +240,7 @@ def test_colours_of_an_image_datablock(scene: SimpleNamespace) -> None:
 
 
 def test_linked_values_are_kept_not_refused(scene: SimpleNamespace) -> None:
-    value = tree(scene).nodes.new("ShaderNodeValue")
+    value = tree(scene).nodes.new("ShaderNodeTexNoise")
     tree(scene).links.new(value.outputs[0], principled(scene).inputs["Roughness"])
     assert stopping(scene) == {}
     assert any(
