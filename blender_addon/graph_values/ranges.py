@@ -62,7 +62,7 @@ AMOUNTS = {
 }
 OF_SUMS, OF_PRODUCTS = ("ADD", "SUBTRACT", "MULTIPLY_ADD"), ("MULTIPLY", "DIVIDE")
 # Nodes whose own numbers are dials. Those of Math are none: a picture with a factor stays one, and 1 - x an inverse
-DIALS = ("ShaderNodeGroup", "ShaderNodeValue", "ShaderNodeMapRange", "ShaderNodeMix", "ShaderNodeMixRGB")
+DIALS = ("ShaderNodeGroup", "ShaderNodeValue", "ShaderNodeMapRange", "ShaderNodeMix")
 LEFT_OUT = (("ShaderNodeBump", "Filter Width"),)  # how nodes are sampled, and not what they show
 DIRECTION = ("ShaderNodeNormalMap", "Color")  # an input whose colour is a direction
 SCALES = ("Scale", "Distance", "Lacunarity", "Brick Width", "Row Height", "Detail Scale")

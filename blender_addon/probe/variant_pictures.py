@@ -6,9 +6,9 @@ Each variant is a copy of the material's whole tree; Cycles merges what is the s
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence, Set
+from collections.abc import Callable, Iterable, Mapping, Sequence, Set
 from dataclasses import dataclass, replace
-from functools import partial
+from functools import cached_property, partial
 from pathlib import Path
 from typing import Any
 
@@ -16,11 +16,12 @@ import bpy
 import numpy as np
 from numpy.typing import NDArray
 
+from ..export.nodes.clear_objects import is_clear
 from ..graph_values.place import Place, write
 from .aov_render import Frame, world_to_frame
 from .closure_tree import ClosureTree
 from .depths import FAR_SIDE, joined_depths, peeled, scale_of_far_side, with_far_side
-from .graph_copy import own_copy, remove_copy, variant_of
+from .graph_copy import nodes_of, own_copy, remove_copy, variant_of
 from .other_views import ELSEWHERE_SCALE, asks_ray, cosines_of, see_from_elsewhere
 from .server import ProbeRequestError
 from .target import (
@@ -103,6 +104,15 @@ class VariantPictures:
     samples: int
     places: Sequence[Place] = ()
 
+    @cached_property
+    def _has_holes(self) -> bool:
+        """Whether a shader lets light straight on, so that pictures of others may be of what it leaves."""
+        return any(map(is_clear, nodes_of(self.target.material.node_tree)))
+
+    def _outputs_of(self, variants: Sequence[Variant]) -> int:
+        """How many one render of them has: an alpha of each where there are holes, mask and position."""
+        return sum(len(variant.names) + self._has_holes for variant in variants) + 2
+
     def take(
         self,
         variants: Sequence[Variant],
@@ -123,7 +133,7 @@ class VariantPictures:
         """
         most = max(min(len(variants), MOST_VARIANTS), 1)
         while True:
-            frame = self.target.frame(scale, _outputs_of(variants[:most]) * (depths[-1] + 1))
+            frame = self.target.frame(scale, self._outputs_of(variants[:most]) * (depths[-1] + 1))
             if frame.scale < scale and most > 1:  # all answers of a fit have one size
                 most //= 2
                 continue
@@ -164,7 +174,7 @@ class VariantPictures:
             some = variants[begin : begin + most]
             found, kinds = self._rendered(some, frame, depths)
             if far_side:
-                behind = self.target.frame(scale_of_far_side(frame), _outputs_of(some) * (FAR_SIDE + 1))
+                behind = self.target.frame(scale_of_far_side(frame), self._outputs_of(some) * (FAR_SIDE + 1))
                 found = with_far_side(found, self._rendered(some, behind, (FAR_SIDE,))[0])
             mask = found[MASK]
             seen = mask[..., 0] > SEEN
@@ -203,10 +213,13 @@ class VariantPictures:
                     see_from_elsewhere(tree, variant.cosine)
                 _put(tree, self.places, variant.values, material.name)
                 outputs = {name: _name(k, i) for i, name in enumerate(variant.names)}
-                closures = ClosureTree(tree)  # of the surface that the outputs take the place of
+                # of the surface that the outputs take the place of
+                closures = ClosureTree(tree) if self._has_holes or _asks_weight(self.paths, outputs) else None
                 kinds |= _put_outputs(tree, self.paths, outputs, closures)
                 wanted += [(output, kinds[name] != "VALUE") for name, output in outputs.items()]
-                alphas |= _weigh(tree, self.paths, outputs, closures)
+                if self._has_holes:
+                    assert closures is not None
+                    alphas |= _weigh(tree, self.paths, outputs, closures)
             wanted += [(output, False) for output in dict.fromkeys(alphas.values())]
             at_depths = peeled(copy.node_tree, wanted, depths[-1] + 1)
             outputs = partial(self.target.outputs, copy, frame=frame, by_pixels=by_pixels)
@@ -284,8 +297,8 @@ def _weigh(
     return found
 
 
-def _outputs_of(variants: Sequence[Variant]) -> int:
-    return sum(len(variant.names) + 1 for variant in variants) + 2  # an alpha of each; mask and position
+def _asks_weight(paths: Mapping[str, Sequence[str]], names: Iterable[str]) -> bool:
+    return not all(paths[name][-1] for name in names)
 
 
 def _name(variant: int, socket: int) -> str:
@@ -303,7 +316,10 @@ def _put(tree: bpy.types.NodeTree, places: Sequence[Place], values: Sequence[Any
 
 
 def _put_outputs(
-    tree: bpy.types.NodeTree, paths: Mapping[str, Sequence[str]], outputs: Mapping[str, str], closures: ClosureTree
+    tree: bpy.types.NodeTree,
+    paths: Mapping[str, Sequence[str]],
+    outputs: Mapping[str, str],
+    closures: ClosureTree | None,
 ) -> dict[str, str]:
     """Put an output node of the given name on each of these sockets of a variant; returns the sockets' types."""
     remove_outputs(tree)
@@ -315,5 +331,6 @@ def _put_outputs(
         if socket:
             kinds[name] = write_outputs(tree, shader, {socket: output})[socket]
         else:
+            assert closures is not None
             kinds[name] = write_weight(tree, closures, shader, output)
     return kinds

@@ -17,7 +17,12 @@ def bends_light(item: bpy.types.Object) -> bool:
 
 def passes_light(item: bpy.types.Object) -> bool:
     """Whether some of it goes straight on: transparency, alpha."""
-    return any(node.bl_idname == "ShaderNodeBsdfTransparent" or _differs(node, "Alpha", 1.0) for node in nodes_of(item))
+    return any(map(is_clear, nodes_of(item)))
+
+
+def is_clear(node: bpy.types.Node) -> bool:
+    """Whether light goes straight on through a shader, or a part of it."""
+    return node.bl_idname == "ShaderNodeBsdfTransparent" or _differs(node, "Alpha", 1.0)
 
 
 def nodes_of(item: bpy.types.Object) -> Iterator[bpy.types.Node]:
