@@ -58,13 +58,14 @@ def world_key(scene: bpy.types.Scene, width: int) -> str | None:
 
 
 def surface_key(
-    scene: bpy.types.Scene, instance: Any, depsgraph: bpy.types.Depsgraph, slot: int, size: int
+    scene: bpy.types.Scene, instance: Any, depsgraph: bpy.types.Depsgraph, slot: int, size: int, rays: str
 ) -> str | None:
-    """The key of a bake of the material in `slot` of a depsgraph's instance, `size` texels along each side."""
+    """The key of a bake of the material in `slot` of a depsgraph's instance, `size` texels along each side, for `rays`
+    of a kind."""
     shown = material_of_slot(instance.object, slot)
     assert shown is not None
     material, item = shown.original, instance.object
-    key = _Key("surface", scene, (size, slot, slot_count(item)))
+    key = _Key("surface", scene, (size, slot, slot_count(item), rays))
 
     def put() -> None:
         tree = node_tree_of(material)

@@ -83,11 +83,11 @@ def _cache(request: Mapping[str, Any]) -> Path | None:
 
 
 def _surface(scene: bpy.types.Scene, asked: Mapping[str, Any], place: Path, cache: Path | None) -> dict[str, Any]:
-    slot, size = asked["slot"], asked["size"]
+    slot, size, rays = asked["slot"], asked["size"], asked["rays"]
 
     def baked(instance: bpy.types.DepsgraphObjectInstance, depsgraph: bpy.types.Depsgraph) -> dict[str, Any]:
-        key = surface_key(scene, instance, depsgraph, slot, size) if cache is not None else None
-        return cached(cache, key, place, lambda: baked_surface(scene, instance, depsgraph, slot, place, size))
+        key = surface_key(scene, instance, depsgraph, slot, size, rays) if cache is not None else None
+        return cached(cache, key, place, lambda: baked_surface(scene, instance, depsgraph, slot, place, size, rays))
 
     return _of_instance(asked["instance"], baked)
 

@@ -23,7 +23,7 @@ from ..export.nodes.graph_findings import is_of_normal_map
 from ..export.nodes.leaf_kinds import EMISSION, distribution_of, is_shader, kind_of, only_nearest, walks_of
 from ..export.nodes.read_alphas import keep_alphas
 from ..probe.closure_tree import ClosureTree, Leaf, Value, own_groups
-from ..probe.light_path import SCATTERED, answer_light_paths, answer_random, light_path_outputs
+from ..probe.light_path import ANSWERS, answer_light_paths, answer_random, light_path_outputs
 from ..versions import active_output
 from .stage import Stage, bake, staged
 from .unwrap import unwrapped
@@ -41,9 +41,17 @@ SKIPPED = ("Weight", "Normal", *LEFT_OUT)
 
 
 def baked_surface(
-    scene: bpy.types.Scene, instance: Any, depsgraph: bpy.types.Depsgraph, slot: int, folder: Path, size: int
+    scene: bpy.types.Scene,
+    instance: Any,
+    depsgraph: bpy.types.Depsgraph,
+    slot: int,
+    folder: Path,
+    size: int,
+    rays: str = "scattered",
 ) -> dict[str, Any]:
     """Bake the material in `slot` of a depsgraph's instance into `folder`, `size` texels along each side.
+
+    Light Path answers as to `rays` of that kind (`probe.light_path.ANSWERS`).
 
     Returns ``corners``, the name of a .npy with UV (triangles, 3, 2) of all triangles of the object; ``leaves``,
     those that reflect light or let it through, each with ``kind``, ``name``, ``weight``, ``sockets`` and what of the
@@ -61,7 +69,7 @@ def baked_surface(
     try:
         tree = material.node_tree
         paths, place = light_path_outputs(tree), asked_of_place(tree)
-        groups += answer_light_paths(tree, SCATTERED)
+        groups += answer_light_paths(tree, ANSWERS[rays])
         if instance.is_instance:  # what is none has a number by its name, which the object on stage has, too
             groups += answer_random(tree, instance.random_id % (MOST_RANDOM + 1) / MOST_RANDOM)
         view, around = asked_for(tree, OF_VIEW), asked_for(tree, OF_SURROUNDINGS)

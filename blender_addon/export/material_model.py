@@ -58,13 +58,14 @@ class Socket:
 
 @dataclass
 class Material:
-    """What a surface is made of. `model` is principled, diffuse, emission, null (nothing there), mix or bumped.
+    """What a surface is made of. `model` is principled, diffuse, emission, null (nothing there), mix, bumped or by_ray.
 
     A mix and a bumped surface have `parts`, and of sockets those of emission alone. `normal` (height, width, 3) has
     normals in the frame of the UV map, n / 2 + 1 / 2; where it is `displaced` these take the place of the mesh's
     smooth ones, as a displacement by bump does, and where `turned` they have the opposite direction on the other side
     of the surface, as those of a socket. Without `transparent_shadows` no light passes into a shadow. Tangents
     that circle an axis of the object, X, Y or Z in `circling`, are in its meshes.
+    One that is something else `by_ray` has the ids of BSDFs by kinds of rays, and of sockets those of emission alone.
     `shader` is the backend's word for lobes that are not all of a Principled BSDF.
 
     The target may be one leaf of a mix: `weight` is its share, and `leaves` are the others with theirs. `node` is the
@@ -97,6 +98,7 @@ class Material:
     ways: tuple[dict[str, Any], ...] = ()
     varies: bool = False
     emission_is_dimmed: bool = False
+    by_ray: Mapping[str, str] = field(default_factory=dict)
 
     @property
     def is_mixed(self) -> bool:

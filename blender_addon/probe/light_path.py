@@ -10,8 +10,16 @@ import bpy
 # What a ray that left a diffuse surface is told; everything else is 0. Light over a first bounce is most of the light.
 SCATTERED = {"Is Diffuse Ray": 1.0, "Is Reflection Ray": 1.0, "Ray Depth": 1.0, "Diffuse Depth": 1.0}
 CAMERA = {"Is Camera Ray": 1.0}
+GLOSSY = {"Is Glossy Ray": 1.0, "Is Reflection Ray": 1.0, "Ray Depth": 1.0, "Glossy Depth": 1.0}
+# a bend through a surface is glossy, too (Cycles 5.0: kernel/integrator/path_state.h)
+BENT = {"Is Glossy Ray": 1.0, "Is Transmission Ray": 1.0, "Ray Depth": 1.0, "Transmission Depth": 1.0}
+SHADOW = {"Is Shadow Ray": 1.0, "Ray Depth": 1.0}
+# by the words of the backend's plugin `by_ray`; the camera's are what that has for none
+ANSWERS = {"scattered": SCATTERED, "glossy": GLOSSY, "transmission": BENT, "shadow": SHADOW, "camera": CAMERA}
 # outputs that tell the camera's rays from all others, and nothing else
 OF_CAMERA = ("Is Camera Ray",)
+# those that surfaces answer by the kind of the ray
+OF_RAYS = tuple(f"Is {kind} Ray" for kind in ("Camera", "Diffuse", "Glossy", "Transmission", "Reflection", "Shadow"))
 OF_SHADOW = ("Is Shadow Ray",)  # the same of rays that ask a surface for nothing but how much light it lets through
 
 
@@ -24,6 +32,17 @@ def light_path_outputs(tree: bpy.types.NodeTree) -> set[str]:
         elif node.bl_idname == "ShaderNodeGroup" and node.node_tree is not None:
             found |= light_path_outputs(node.node_tree)
     return found
+
+
+def other_looks(tree: bpy.types.NodeTree) -> dict[str, str]:
+    """The kinds of rays of `ANSWERS` that find another surface than scattered ones, each with the kind to ask for it.
+
+    Of kinds that are told the same the first stands for all.
+    """
+    asked = light_path_outputs(tree)
+    told = {kind: tuple(answers.get(name, 0.0) for name in asked) for kind, answers in ANSWERS.items()}
+    first = {answer: kind for kind, answer in reversed(told.items())}
+    return {kind: first[answer] for kind, answer in told.items() if first[answer] != "scattered"}
 
 
 def answer_light_paths(

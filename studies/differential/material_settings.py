@@ -143,7 +143,7 @@ def _all() -> Iterator[Setting]:
     yield Setting("tinted", _tinted)
     yield Setting("box glass", _box_glass, ("caustics",))
     yield Setting("object info", _object_info)
-    yield Setting("by light path", _by_light_path, ("Light Path",))
+    yield Setting("by light path", _by_light_path)
     yield Setting("volume", _volume, ("olume",))
 
 

@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ...probe.light_path import OF_RAYS
 from ..findings import Findings
 from ..images.color_space import to_rec709
 from ..lights.light_model import takes_light
@@ -55,7 +56,8 @@ class Baked:
         """
         self._note(name, findings)
         leaves = self._answer["leaves"]
-        weighted = [(self._weight(leaf["weight"]), self._leaf(leaf, name, findings)) for leaf in leaves]
+        weighted = [(weight, leaf) for leaf in leaves if (weight := self._weight(leaf["weight"])).any()]
+        weighted = [(weight, self._leaf(leaf, name, findings)) for weight, leaf in weighted]
         weighted = _normalised(weighted, name, findings)
         emission = self._emission(name, findings)
         if not weighted:
@@ -185,8 +187,9 @@ class Baked:
         turned = any(leaf["sockets"].get(own, 0.0) != 0.0 for leaf in self._answer["leaves"] for own in TURNED)
         if turned and not self._circles:
             findings.note(f"Material '{name}': its anisotropy follows the UV map of the bake.")
-        if self._answer["paths"]:
-            asked = ", ".join(self._answer["paths"])
+        paths = [output for output in self._answer["paths"] if output not in OF_RAYS or "emission" in self._answer]
+        if paths:
+            asked = ", ".join(paths)
             findings.note(f"Material '{name}' asks Light Path for {asked}: the fit has it as diffuse rays see it.")
 
 

@@ -42,6 +42,9 @@ def bsdf_element(
         assert material.normal is not None
         normals = texture_element("normalmap", material.normal, save(material.normal))
         return add(plugin("bsdf", "normalmap", identifier), normals, reference(material.parts[0].bsdf))
+    if material.model == "by_ray":
+        looks = (reference(bsdf, rays) for rays, bsdf in material.by_ray.items())
+        return add(plugin("bsdf", "by_ray", identifier), *looks)
     if material.model == "mix":
         return _mixed(material.parts, identifier, save)
     inner = _principled(material, save, findings, every)

@@ -31,10 +31,10 @@ def shadow_transmission(instance: bpy.types.DepsgraphObjectInstance, slot: int) 
     return None if material is None or material.use_transparent_shadow else 0.0
 
 
-def hidden_from(instance: bpy.types.DepsgraphObjectInstance) -> list[str]:
-    """The kinds of rays, of those that the fit does not tell apart, which pass an instance."""
+def hidden_from(instance: bpy.types.DepsgraphObjectInstance) -> tuple[str, ...]:
+    """The kinds of rays, of those that a surface has sent on, which pass an instance."""
     kinds, owners = ("diffuse", "glossy", "transmission"), (instance.object, shown_by(instance))
-    return [kind for kind in kinds if not all(getattr(each, f"visible_{kind}") for each in owners)]
+    return tuple(kind for kind in kinds if not all(getattr(each, f"visible_{kind}") for each in owners))
 
 
 def note_visibility(instance: bpy.types.DepsgraphObjectInstance, findings: Findings) -> None:
@@ -48,8 +48,5 @@ def note_visibility(instance: bpy.types.DepsgraphObjectInstance, findings: Findi
     for system in item.particle_systems:
         if system.settings.type == "HAIR" and system.settings.render_type == "PATH":
             findings.note(f"The hair '{system.name}' of '{item.name}' is left out.")
-    off = hidden_from(instance)
-    if off:
-        findings.note(f"Object '{item.name}' is hidden from {', '.join(off)} rays; in the fit it is not.")
     if any(each.is_holdout or each.is_shadow_catcher for each in (item, parent)):
         findings.note(f"Object '{item.name}' is a holdout or shadow catcher; in the fit it is an object.")

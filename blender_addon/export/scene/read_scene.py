@@ -49,11 +49,12 @@ from ..render_state import (
 )
 from ..steps import Steps
 from .origin import moved, note_far_scattering, note_wide_scattering, scene_origin
+from .ray_looks import hide_from_rays, note_hidden
 from .ray_visibility import camera_misses, hidden_from, note_visibility, shadow_transmission
 from .read_settings import name_render_settings, read_settings
 from .read_world import BLACK, read_world
 from .scene_bakes import SceneBakes, Surface
-from .scene_data import SceneData, Shape, Terminator, target_bsdf, target_shape
+from .scene_data import Hidden, SceneData, Shape, Terminator, target_bsdf, target_shape
 from .visibility import check_visible, met_points, say_no_faces
 
 SILENT_TYPES = ("EMPTY", "ARMATURE", "LATTICE", "CAMERA", "SPEAKER", "LIGHT_PROBE")
@@ -182,6 +183,7 @@ def finish_scene(data: SceneData, findings: Findings, bakes: SceneBakes | None =
     if bakes is not None:
         bakes.finish(data, findings)
     note_wide_scattering(data, findings)
+    hide_from_rays(data, findings)
     for material in data.materials.values():
         below_zero = data.settings.gives_below_zero
         leaves = [leaf for leaf in (material, *material.leaves) if leaf.model == "emission" or below_zero]
@@ -316,7 +318,7 @@ class _Walk:
         if mesh is None:
             return
         note_visibility(instance, self.findings)
-        hidden = camera_misses(instance, self.depsgraph.view_layer)
+        hidden, rays = camera_misses(instance, self.depsgraph.view_layer), Hidden(item.name, hidden_from(instance))
         last = max(slot_count(item) - 1, 0)
         slots = np.clip(mesh.slots, 0, last)
         bsdfs = {int(slot): self._bsdf(item, int(slot)) for slot in np.unique(slots)}
@@ -343,6 +345,7 @@ class _Walk:
                 self.target_shadows[fitted[slot]].append(shadow_transmission(instance, slot))
                 if hidden:
                     self.findings.error(f"Object '{item.name}' is hidden from camera rays: let the camera see it.")
+                note_hidden(rays, self.findings)
                 continue
             terminator, shadow = Terminator(*shadow_terminator(item)), shadow_transmission(instance, slot)
             if bsdf in self.baked:
@@ -350,7 +353,7 @@ class _Walk:
                 if self.bakes is not None:
                     bsdf = self.bakes.ask_surface(self.data, name, Surface(instance, slot, piece), self.findings)
             linked = linked_light(item)
-            self.data.shapes.append(Shape(name, NOT_PLACED, bsdf, terminator, shadow, hidden, body, linked))
+            self.data.shapes.append(Shape(name, NOT_PLACED, bsdf, terminator, shadow, hidden, body, linked, rays))
 
     def _body(self, bsdfs: dict[int, str]) -> int:
         """The number of an object of several shapes that light goes through below the surface, else 0."""

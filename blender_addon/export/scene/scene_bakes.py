@@ -20,7 +20,7 @@ from ...bake.panorama import ALIKE, LEAST_WIDTH, MOST_WIDTH
 from ...bake.requests import name_of
 from ...bake.stage import color_of
 from ...probe.client import Probe
-from ...probe.light_path import OF_CAMERA
+from ...probe.light_path import OF_CAMERA, other_looks
 from ...versions import node_tree_of
 from ..camera.camera_model import Camera
 from ..findings import Findings
@@ -47,6 +47,7 @@ from ..nodes.displacement import bends_normals
 from ..nodes.graph_findings import note_missing_pictures, note_pixel_sizes
 from ..render_state import rendered_layer
 from .displaced_meshes import OTHER_FACES, DisplacedMeshes
+from .ray_looks import put_looks, scattered_id
 from .scene_data import SceneData
 
 MOST_SURFACES = 64  # baked in one export; what comes later keeps its nearest model
@@ -93,12 +94,13 @@ class _Shown:
 
 @dataclass
 class _Asked:
-    """A surface that is to be baked, and the request that says so."""
+    """A surface that is to be baked, and the request that says so; `looks` are ids of others by kinds of rays."""
 
     material: bpy.types.Material
     owner: str
     request: dict[str, Any]
     shown: list[_Shown] = field(default_factory=list)
+    looks: dict[str, str] = field(default_factory=dict)
 
 
 class SceneBakes:
@@ -167,9 +169,13 @@ class SceneBakes:
                     raise BakeError(f"It would be one of more than {MOST_SURFACES}.")
                 self._baker.start()
                 request = {"instance": name_of(surface.instance), "slot": surface.slot}
-                request["size"] = _texels(data.camera, surface.piece)
+                request |= {"size": _texels(data.camera, surface.piece), "rays": "scattered"}
                 data.materials[identifier] = grey(material.name)
-                self._surfaces[identifier] = _Asked(material, item.name, request)
+                asked = self._surfaces[identifier] = _Asked(material, item.name, request)
+                asked.looks = {rays: f"{identifier}_{of}" for rays, of in other_looks(node_tree_of(material)).items()}
+                for look in dict.fromkeys(asked.looks.values()):
+                    other = request | {"rays": look.rpartition("_")[2]}
+                    self._surfaces[look] = _Asked(material, item.name, other)
             except BakeError as problem:
                 _give_up(data, identifier, material, item.name, problem, findings)
             known[own] = identifier
@@ -219,6 +225,10 @@ class SceneBakes:
                 self._put_surface(data, findings, identifier, asked, baked)
             except BakeError as problem:
                 _give_up(data, identifier, asked.material, asked.owner, problem, findings)
+        for identifier, asked in self._surfaces.items():
+            if asked.looks:
+                shapes = [shown.shape for shown in asked.shown]
+                put_looks(data, identifier, asked.material.name, asked.looks, shapes, findings)
 
     def _put_surface(self, data: SceneData, findings: Findings, identifier: str, asked: _Asked, baked: Baked) -> None:
         corners = baked.corners
@@ -233,9 +243,10 @@ class SceneBakes:
                 f"Material '{asked.material.name}': {', '.join(baked.place)} may differ between the {len(asked.shown)} "
                 f"instances of '{asked.owner}'; all have the bake of the first."
             )
-        found = baked.materials(identifier, asked.material.name, findings)
+        own = scattered_id(identifier) if asked.looks else identifier
+        found = baked.materials(own, asked.material.name, findings)
         if any(each.passes_light for each in found.values()):
-            key = next(key for key in (f"{identifier}_flat", identifier) if key in found)
+            key = next(key for key in (f"{own}_flat", own) if key in found)
             inside = volume_sockets(asked.material, found[key], findings)
             found[key] = replace(found[key], sockets=found[key].sockets | inside)
         data.materials |= found

@@ -37,12 +37,21 @@ class Terminator:
 
 
 @dataclass(frozen=True)
+class Hidden:
+    """The kinds of `rays`, of diffuse, glossy and transmission, that pass the object `owner`."""
+
+    owner: str = ""
+    rays: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True)
 class Shape:
     """One mesh with one material; `identifier` is its id in the scene file.
 
     `shadow_transmission` is what shadow rays keep at its surface, None where that follows from its alpha. Where
     `camera_hidden` rays of the camera pass it as if it were not there. Shapes of one `body`, above 0, are one object
-    below the surface. `linked` is the object's name where the light it gives is linked to some objects.
+    below the surface. `linked` is the object's name where the light it gives is linked to some objects. Rays may pass
+    what is `hidden` from them.
     """
 
     identifier: str
@@ -53,6 +62,7 @@ class Shape:
     camera_hidden: bool = False
     body: int = 0
     linked: str = ""
+    hidden: Hidden = Hidden()
 
 
 @dataclass(frozen=True)

@@ -154,6 +154,7 @@ SCENE = {
     "'{}' is {} % of material '{}', and the fit has no model of it: its values cannot be told from the others'. Unlink it, or fit another material.": "'{}' ist {} % von Material '{}', und die Anpassung hat kein Modell davon: seine Werte sind nicht von denen der anderen zu unterscheiden. Die Verbindung lösen oder ein anderes Material anpassen.",
     "A {} has {} alone, and none of them is left to fit: choose one that has no link.": "Ein {} hat nur {}, und keiner davon bleibt zum Anpassen: einen ohne Verbindung wählen.",
     "Bump Map Correction of material '{}' is off in Cycles; in the fit normals are corrected.": "Bump Map Correction von Material '{}' ist in Cycles aus; in der Anpassung werden Normalen korrigiert.",
+    "Material '{}' is another to the camera (Light Path): before the target the fit has it as diffuse rays see it.": "Material '{}' ist für die Kamera ein anderes (Light Path): vor dem Ziel hat die Anpassung es, wie diffuse Strahlen es sehen.",
     "Material '{}' asks Light Path for {}: the fit has it as diffuse rays see it.": "Material '{}' fragt Light Path nach {}: die Anpassung hat es, wie diffuse Strahlen es sehen.",
     "Material '{}' asks Light Path for {}: bounces have it as diffuse rays do.": "Material '{}' fragt Light Path nach {}: Reflexionen haben es wie diffuse Strahlen.",
     "Material '{}' asks for Backfacing: bounces have one answer for both sides.": "Material '{}' fragt nach Backfacing: Reflexionen haben für beide Seiten dieselbe Antwort.",

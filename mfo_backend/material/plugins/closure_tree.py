@@ -201,8 +201,7 @@ class ClosureTree(mi.BSDF):
 
     def parameters_changed(self, keys: Any = ()) -> None:
         """Keep the factors what no kernel knows."""
-        for factor in self.factors:
-            dr.make_opaque(factor)
+        dr.make_opaque(self.factors)
 
     def picture_of(self, name: str) -> Any:
         """The texture of a value of `values_at`, or of a direction of the fitted material, that has one."""
@@ -266,6 +265,13 @@ class ClosureTree(mi.BSDF):
         """`eval` and `pdf`, the layers evaluated once."""
         return self._eval_pdf(self.leaves, self._chances(si, active)[0], ctx, si, wo, active)
 
+    def glossy_share(self, si: mi.SurfaceInteraction3f, wo: mi.Vector3f) -> Any:
+        """How likely `sample` has drawn a direction of a glossy lobe of any leaf."""
+        ctx, leaves = mi.BSDFContext(), [leaf.material for leaf in self.leaves]
+        likely = [c * m.pdf(ctx, si, wo) for c, m in zip(self._chances(si, True)[0], leaves, strict=True)]
+        glossy = sum(p * m.glossy_share(si, wo) for p, m in zip(likely, leaves, strict=True))
+        return glossy / dr.maximum(sum(likely), 1e-30)
+
     def mixture(self, si: mi.SurfaceInteraction3f, u1: Any, u2: mi.Point2f, active: Any) -> Mixture:
         """What is drawn at a surface point, and all that does not depend on the fitted material's values."""
         ctx = mi.BSDFContext()
@@ -315,11 +321,9 @@ class ClosureTree(mi.BSDF):
             chance += mix.chance * fitted.passing_chance(ctx, si, active)
         density, value = dr.select(straight, chance, density), dr.select(straight, passes, value)
         valid = active & ((bs.pdf > 0) | straight) & (density > 0)
-        bs.wo = dr.select(straight, -si.wi, bs.wo)
-        bs.pdf = dr.select(valid, density, 0)
-        bs.eta = mi.Float(1)
+        bs.wo, bs.pdf = dr.select(straight, -si.wi, bs.wo), dr.select(valid, density, 0)
+        bs.eta, bs.sampled_component = mi.Float(1), mi.UInt32(0)
         bs.sampled_type = dr.select(straight, mi.UInt32(+mi.BSDFFlags.Null), bs.sampled_type)
-        bs.sampled_component = mi.UInt32(0)
         return bs, dr.select(valid, value / dr.maximum(density, 1e-30), 0)
 
     def eval_null_transmission(self, si: mi.SurfaceInteraction3f, active: Any = True) -> Any:

@@ -39,7 +39,7 @@ from ..cycles_model import CyclesModel, cycles_model
 from ..principled.blender_principled import evaluate
 from ..principled.bumped_normals import BUMPED_NORMALS, OWN_NORMALS, BumpedNormals, valid_normal
 from ..principled.layers import Layers, layer_stack, sampled_emission
-from ..principled.lobe_sampling import NAMES, LobeChoice, is_diffuse, lobe_choice, pdf, sample
+from ..principled.lobe_sampling import NAMES, LobeChoice, glossy_share, is_diffuse, lobe_choice, pdf, sample
 from ..principled.needed_lobes import Lobes, needed_lobes
 from ..principled.principled_parameters import BLENDER_PRINCIPLED
 from ..principled.random_walk import Below
@@ -318,6 +318,11 @@ class BlenderPrincipled(mi.BSDF):
         value = mi.Color3f(evaluate(layers, local, reachable_only=only))
         return dr.select(active, value, 0), dr.select(active, density, 0)
 
+    def glossy_share(self, si: mi.SurfaceInteraction3f, wo: mi.Vector3f) -> Any:
+        """How likely `sample` has drawn a direction of a glossy lobe."""
+        surface, ctx = self.layers_at(si, True), mi.BSDFContext()
+        return glossy_share(surface.layers, self._choice(ctx, surface.layers), surface.to_local(wo))
+
     def sample(
         self,
         ctx: mi.BSDFContext,
@@ -337,13 +342,11 @@ class BlenderPrincipled(mi.BSDF):
         local, lobe, valid = sample(layers, choice, sample1, sample2)
         valid &= active
         density = pdf(layers, choice, local)
-        weight = mi.Color3f(evaluate(layers, local)) / dr.maximum(density, 1e-30)
-        weight = dr.select(density > 0, weight, 0)
-        glass = lobe == NAMES.index("glass")
+        weight = dr.select(density > 0, mi.Color3f(evaluate(layers, local)) / dr.maximum(density, 1e-30), 0)
+        glass, through = (lobe == NAMES.index(name) for name in ("glass", "translucent"))
         diffuse = is_diffuse(lobe, self.model.shader)
         kind = dr.select(diffuse, mi.UInt32(+mi.BSDFFlags.DiffuseReflection), mi.UInt32(+mi.BSDFFlags.GlossyReflection))
         kind = dr.select(glass & (local.z < 0), mi.UInt32(+mi.BSDFFlags.GlossyTransmission), kind)
-        through = lobe == NAMES.index("translucent")
         kind = dr.select(through, mi.UInt32(+mi.BSDFFlags.DiffuseTransmission), kind)
         if choice["transparent"] is not None:
             through = lobe == NAMES.index("transparent")
@@ -351,11 +354,9 @@ class BlenderPrincipled(mi.BSDF):
             weight = dr.select(through, mi.Color3f(layers.transparency / dr.maximum(density, 1e-12)), weight)
             kind = dr.select(through, mi.UInt32(+mi.BSDFFlags.Null), kind)
         bs = dr.zeros(mi.BSDFSample3f)
-        bs.wo = surface.from_local(local)
-        bs.pdf = dr.select(valid, density, 0)
+        bs.wo, bs.pdf = surface.from_local(local), dr.select(valid, density, 0)
         bs.eta = 1.0  # radiance is not scaled at the interface
-        bs.sampled_type = kind
-        bs.sampled_component = mi.UInt32(0)
+        bs.sampled_type, bs.sampled_component = kind, mi.UInt32(0)
         return bs, dr.select(valid, weight, 0)
 
     def eval_null_transmission(self, si: mi.SurfaceInteraction3f, active: Any = True) -> Any:

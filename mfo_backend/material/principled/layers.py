@@ -62,6 +62,7 @@ class Layers:
     sheen: Any = None
     sheen_shape: SheenLobe | VelvetLobe | ToonLobe | None = None
     coat: Any = None
+    coat_albedo: Any = None
     coat_alpha: Any = None
     coat_ior: Any = None
     metal: Any = None
@@ -74,6 +75,7 @@ class Layers:
     glass_reflected: Any = 1
     specular: Any = None
     specular_fresnel: DielectricTerm | None = None
+    specular_albedo: Any = None
     diffuse: Any = None
     base: Any = None
     diffuse_roughness: Any = None
@@ -221,8 +223,10 @@ def _add_coat(stack: dict[str, Any], p: Mapping[str, Any], w: Any, mu: Any, mode
         albedo = dr.select(n > 1, f0 + (1 - f0) * schlick_albedo(roughness, mu, n), 0)
     else:
         gain, albedo = NO_COMPENSATION, dielectric(mu, n)
-    stack |= {"coat": w * weight * gain.scale, "coat_alpha": dr.maximum(dr.square(roughness), 1e-6), "coat_ior": n}
-    return w * saturate(1 - weight * gain.weight * albedo) * _below_coat(p, mu)
+    albedo = weight * gain.weight * albedo
+    stack |= {"coat": w * weight * gain.scale, "coat_albedo": w * albedo, "coat_ior": n}
+    stack["coat_alpha"] = dr.maximum(dr.square(roughness), 1e-6)
+    return w * saturate(1 - albedo) * _below_coat(p, mu)
 
 
 def _below_coat(p: Mapping[str, Any], mu: Any) -> Any:
@@ -294,6 +298,7 @@ def _add_plastic(
     counts = (w > 0) | (largest(w) <= 0)
     hidden = dr.select(counts & present, gain.weight * albedo, 0)
     stack |= {"specular": dr.select(present, w * gain.scale, 0), "specular_fresnel": fresnel}
+    stack["specular_albedo"] = dr.select(present, w * gain.weight * albedo, 0)
     w = w * saturate(1 - largest(hidden))
     colour = at_least(p["base_color"], 0)
     if lobes.subsurface:

@@ -13,7 +13,6 @@ from typing import Any
 import drjit as dr
 
 from ..arrays.clamp import mean
-from ..lobes.fresnel import dielectric
 from ..lobes.microfacet import sample_visible, visible_pdf
 from .blender_principled import reached, refraction_normal
 from .bumped_normals import about, out_of
@@ -51,11 +50,11 @@ def lobe_choice(layers: Layers, with_transparency: bool, least_diffuse: float = 
     if layers.sheen is not None:
         strength["sheen"] = mean(layers.sheen)
     if layers.coat is not None:
-        strength["coat"] = mean(layers.coat) * dielectric(mu, layers.coat_ior)
+        strength["coat"] = mean(layers.coat_albedo)
     if layers.metal is not None and layers.metal_fresnel is not None:
         strength["base"] = mean(layers.metal * layers.metal_fresnel(mu))
-    if layers.specular is not None and layers.specular_fresnel is not None:
-        strength["base"] = strength.get("base", 0) + mean(layers.specular * layers.specular_fresnel(mu))
+    if layers.specular is not None:
+        strength["base"] = strength.get("base", 0) + mean(layers.specular_albedo)
     if layers.glass is not None:
         strength["glass"] = mean(layers.glass)
     if layers.diffuse is not None:
@@ -110,6 +109,12 @@ def pdf(layers: Layers, choice: LobeChoice, wo: Any, *, reachable_only: Any = Fa
     if choice["translucent"] is not None:
         density += dr.select(wi.z > 0, choice["translucent"] * dr.maximum(-wo.z, 0) / dr.pi, 0)
     return dr.detach(density)
+
+
+def glossy_share(layers: Layers, choice: LobeChoice, wo: Any) -> Any:
+    """How likely `sample` has drawn `wo` of a lobe that scatters no diffuse bounce."""
+    glossy = {name: chance for name, chance in choice.probability.items() if name in ("coat", "base", "glass")}
+    return pdf(layers, LobeChoice(glossy), wo) / dr.maximum(pdf(layers, choice, wo), 1e-30)
 
 
 def _with_diffuse(density: Any, layers: Layers, choice: LobeChoice, wo: Any) -> Any:

@@ -13,6 +13,7 @@ from ...types.errors import BadInputError
 # registered from Python
 OURS = (
     "blender_principled",
+    "by_ray",
     "blender_point",
     "blender_spot",
     "blender_sharp_spot",

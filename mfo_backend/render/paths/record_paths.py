@@ -16,7 +16,6 @@ import mitsuba as mi
 import numpy as np
 
 from ...material.arrays.own_memory import own_memory
-from ...material.plugins.material_kinds import MaterialKinds
 from ...material.principled.random_walk import WALK, Below
 from ...types.errors import BadInputError
 from ...types.light_paths import LightPaths
@@ -29,7 +28,7 @@ from ..random_numbers.even_points import even_points
 from ..transport.ray_starts import RayStarts
 from ..transport.shadow_rays import ShadowRays
 from ..transport.smooth_facets import leaves_on, met_light, seen_side
-from ..transport.traced_radiance import traced_radiance
+from ..transport.traced_radiance import sent_on, tells_rays
 from .merged_lanes import TechniqueLanes, coverage_of, merged_lanes
 from .record_settings import RecordSettings
 from .recorded_background import add_radiance, recorded_background
@@ -140,7 +139,7 @@ def record_paths(
             exact.append(_lit(hits, nowhere, radiance, mi.Bool(True))())
         lanes = [replace(e, position=e.position + s * hits.pixels) for s in range(settings.samples) for e in exact]
         if sampled:
-            lanes += _sampled_lights(scene, hits, settings, lamps, shadows)
+            lanes += _sampled_lights(scene, shape, hits, settings, lamps, shadows)
         if below is not None:
             lanes.append(_walks(scene, hits, of_hits, below, settings, free=walks_free))
 
@@ -248,7 +247,12 @@ def _delta_lights(scene: mi.Scene, hits: _Hits, shadows: ShadowRays) -> list[Tec
 
 
 def _sampled_lights(
-    scene: mi.Scene, hits: _Hits, settings: RecordSettings, lamps: SceneLamps, shadows: ShadowRays
+    scene: mi.Scene,
+    shape: mi.Shape,
+    hits: _Hits,
+    settings: RecordSettings,
+    lamps: SceneLamps,
+    shadows: ShadowRays,
 ) -> list[TechniqueLanes]:
     """Light samples and proposal samples of the camera rays, weighted by the balance heuristic (Veach 1995)."""
     everywhere = list(scene.emitters())
@@ -267,8 +271,7 @@ def _sampled_lights(
     tile = hits.position // TILE**2 + own * dr.opaque(mi.UInt32, tiles)
     pixels, tiles = hits.pixels * settings.samples, tiles * settings.samples
     hits = replace(hits, position=hits.position + sample * dr.opaque(mi.UInt32, hits.pixels))
-    proposal, terminator = settings.proposal, shadows.terminator
-    front = si.wi.z > 0.0
+    proposal, terminator, front = settings.proposal, shadows.terminator, si.wi.z > 0.0
     # Each extended light is chosen equally often, and that exactly: its share of the rays of a pixel left to chance
     # would be most of the noise, 3 % of a tile for two lights
     choice = 1.0 / max(len(extended), 1)
@@ -288,8 +291,13 @@ def _sampled_lights(
         lit &= dr.max(value) > 0.0
         light_density = ds.pdf * choice
         mis = light_density / (light_density + proposal.density(si.wi, wo, hits.coat, hits.diffuse))
-        # what comes straight through a surface is left to light samples: after `before`, `cycles_path` adds none of it
-        mis = dr.select(passed.alpha, 1.0, mis)
+        # what comes straight through a surface is left to light samples: after `before`, `cycles_path` adds none of it,
+        # but where not all rays go through, whose light Cycles' samples leave to them
+        straight = mi.Float(1.0)
+        if tells_rays(scene, shape.bsdf(), settings.light_paths):
+            of_scene = scene.pdf_emitter_direction(si, ds, lit)
+            straight = of_scene / (of_scene + si.bsdf().pdf(mi.BSDFContext(), si, wo, lit))
+        mis = dr.select(passed.alpha, straight, mis)
         started.append(_lit(hits, wo, value * (share * mis / choice * terminator.bend(si, wo, lit)), lit))
 
     lobe, *u = even_points(3, number, tile, tiles, settings.seed + 0x51ED270)
@@ -314,7 +322,7 @@ def _sampled_lights(
             some = first.of_rays(index - index // rays * rays)
             met, towards = (dr.gather(type(a), a, index) for a in (met, wo))
             total = dr.gather(mi.Color3f, weight, index) + _over_others(
-                scene, shadows.starts, some, met, towards, settings
+                scene, shape, shadows.starts, some, met, towards, settings
             )
             dr.scatter(weight, total, index, mode=dr.ReduceMode.Permute)
     # the share may be negative, where the pixel filter is
@@ -341,6 +349,7 @@ def _walks(
 
 def _over_others(
     scene: mi.Scene,
+    shape: mi.Shape,
     starts: RayStarts,
     hits: _Hits,
     met: mi.PreliminaryIntersection3f,
@@ -351,14 +360,10 @@ def _over_others(
 
     Few rays of most scenes meet something: they are traced on from there side by side.
     """
-    si = hits.si
-    before = None
-    if settings.light_paths is not None:
-        value, likely = MaterialKinds(scene).eval_pdf(si.bsdf(), mi.BSDFContext(), si, wo, mi.Bool(True))
-        before = (likely, value / dr.maximum(likely, 1e-12))
-    sampler = fresh_sampler(settings.seed + 0x51ED270, dr.width(wo))
+    si, sampler = hits.si, fresh_sampler(settings.seed + 0x51ED270, dr.width(wo))
     ray = starts.ray(si, si.to_world(wo))
-    radiance = traced_radiance(scene, sampler, ray, settings.light_paths, settings.depth - 1, before=before, met=met)
+    depth = settings.depth - 1
+    radiance = sent_on(scene, shape.bsdf(), sampler, ray, settings.light_paths, depth, si=si, wo=wo, met=met)
     return radiance / settings.proposal.density(si.wi, wo, hits.coat, hits.diffuse)
 
 

@@ -299,17 +299,14 @@ def _loaded(document: Element, scene_xml: Path, light_paths: LightPaths | None) 
     _forget_scenes_before()
     import mitsuba as mi
 
-    from ...material.plugins import closure_tree, leaf_radiance, mapped_normal, principled_plugin, projective_texture
+    from ...material.plugins import by_ray, closure_tree, leaf_radiance, mapped_normal, principled_plugin
+    from ...material.plugins import projective_texture as projective
     from ..lamps import lamp_plugins
     from ..transport import cycles_path
 
-    principled_plugin.register()
-    closure_tree.register()
-    projective_texture.register()
-    mapped_normal.register()
-    leaf_radiance.register()
-    cycles_path.register()
-    lamp_plugins.register()
+    of_materials = (by_ray, closure_tree, leaf_radiance, mapped_normal, principled_plugin, projective)
+    for plugins in (*of_materials, cycles_path, lamp_plugins):
+        plugins.register()
     has_lamps = any(e.get("type") in lamp_plugins.PLUGINS for e in document.iter("emitter"))
     absorbs = any(e.get("name") == "absorption_density" for e in document.iter("float"))
     if light_paths is None and (has_lamps or absorbs or _camera_world(document) is not None):

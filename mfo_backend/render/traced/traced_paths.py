@@ -23,6 +23,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...material.arrays.own_memory import own_memory
+from ...material.plugins.by_ray import CAMERA, is_by_ray, kind_of_ray
 from ...types.errors import UnrecordableError
 from ..camera.primary_rays import camera_ray, through_filter
 from ..lamps.met_lamps import SceneLamps, alone
@@ -68,6 +69,7 @@ class TracedPaths:
         self._light_paths = renderer.light_paths
         self._lamps, self._shadows, self._view = SceneLamps(scene), ShadowRays(scene), CameraView(scene)
         self._terminator, self._absorption = self._shadows.terminator, self._shadows.absorption
+        self._by_ray = is_by_ray(scene)
         self._camera_world = getattr(integrator, "camera_world", None)
         # a mix tells by its other leaves what goes through it; of those this one's alpha is taken as it is
         names = () if target.tree is not None else self.table.names
@@ -163,6 +165,8 @@ class TracedPaths:
             "inside": self._absorption.outside(),
             "active": mi.Bool(True),
         }
+        if self._by_ray:
+            state["kind"] = mi.Float(CAMERA)
         if self._light_paths is not None:
             # the least density so far, and bounces of each kind
             state |= {"least": mi.Float(1e30), "bounces": [mi.UInt32(0) for _ in range(3)]}
@@ -184,6 +188,8 @@ class TracedPaths:
             blur = self._blur(s)
             if blur is not None:
                 si.duv_dx = mi.Point2f(blur, 0.0)
+            of_ray = s.get("kind", 0.0)
+            si.duv_dy = mi.Point2f(0.0, of_ray)
             emitter = si.emitter(scene, active)
             ds = met_light(scene, si, s["before"])
             light = scene.pdf_emitter_direction(s["before"], ds, active & ~s["delta"])
@@ -215,7 +221,7 @@ class TracedPaths:
                 scene, self._shadows, si, rng.pair(2 + 3 * depth), scatters,
                 None if alpha is None else self._bsdf, s["passages"], s["inside"],
             )  # fmt: skip
-            si.duv_dy = mi.Point2f(dr.select(is_unsampled(ds), 1.0, 0.0), 0.0)
+            si.duv_dy = mi.Point2f(dr.select(is_unsampled(ds), 1.0, 0.0), of_ray)
             wo = si.to_local(ds.d)
             lit = scatters & (ds.pdf > 0.0)
             if self._glow is not None:  # which is left to the rays that meet it
@@ -289,6 +295,8 @@ class TracedPaths:
                 "inside": self._absorption.beyond(s["inside"], si, local, active),
                 "active": active,
             }
+            if self._by_ray:
+                after["kind"] = dr.select(is_bounce, kind_of_ray(kind), s["kind"])
             after |= self._counted(s, kind, pdf_next, after["left"])
             if self._light_paths is not None:
                 after |= {"survival": mi.Float(survival), "straight_on": passages > s["passages"]}

@@ -20,6 +20,7 @@ import drjit as dr
 import mitsuba as mi
 from mitsuba.ad.integrators.common import RBIntegrator  # pyright: ignore[reportMissingImports]
 
+from ...material.plugins.by_ray import CAMERA, SCATTERED, is_by_ray, kind_of_ray
 from ...material.plugins.material_kinds import MaterialKinds
 from ...types.light_paths import NO_LIMIT, TRANSPARENT_BOUNCES, LightPaths
 from ..lamps.met_lamps import SceneLamps, alone
@@ -67,6 +68,8 @@ class CyclesPath(RBIntegrator):
         met: Any = None,
         every_lamp: bool = False,
         walked: bool = False,
+        kind: Any = SCATTERED,
+        weighed: Any = 0,
         **_: Any,
     ) -> tuple[Any, Any, list[Any], Any]:
         """See `RBIntegrator.sample`; a path with `before`, density and weight of a bounce, begins after it.
@@ -74,12 +77,13 @@ class CyclesPath(RBIntegrator):
         What `ray` has `met`, if that is known, is not looked for again, and its emission is left out. In a scene whose
         lights have no extent `every_lamp` sums the light of all of them where a camera ray ends, and further on one is
         drawn; it has no derivatives. With `walked` somebody else adds what comes from below the first hit
-        (`exit_light`); for camera rays that is the first behind cut-outs.
+        (`exit_light`); for camera rays that is the first behind cut-outs. The bounce before has sent out rays of a
+        `kind` (`by_ray`), and its light samples are `weighed` against rays of this density that go straight on.
         """
         primal = mode == dr.ADMode.Primal
         lamps, shadows = SceneLamps(scene), ShadowRays(scene)
         terminator, view, absorption = shadows.terminator, CameraView(scene), shadows.absorption
-        context, materials = mi.BSDFContext(), MaterialKinds(scene)
+        context, materials, by_ray = mi.BSDFContext(), MaterialKinds(scene), is_by_ray(scene)
         ray = mi.Ray3f(dr.detach(ray))
         radiance = mi.Spectrum(0 if primal else state_in)
         change = mi.Spectrum(0 if δL is None else δL)
@@ -95,8 +99,9 @@ class CyclesPath(RBIntegrator):
         survival, straight_on = mi.Float(1), mi.Bool(False)
         if shadows.lets_through and before is not None:
             # what such a ray meets straight behind a surface is found by the light samples of where it was sent out
-            density, delta = mi.Float(0), mi.Bool(False)
-        passages = mi.UInt32(0)
+            density, delta = mi.Float(weighed), mi.Bool(False)
+            previous.p = ray.o
+        passages, kind = mi.UInt32(0), mi.Float(CAMERA if before is None else kind)
         inside, dimmed = absorption.outside(), mi.Color3f(1)
         active = mi.Bool(active)
         valid = mi.Bool(False)
@@ -128,6 +133,8 @@ class CyclesPath(RBIntegrator):
                 by_others = (bounce == 1) & (passages == 0)
             without = dr.select(by_others, float(walked), 0.0)
             si.duv_dx = mi.Point2f(least_alpha(self.filter_glossy, least), without)
+            if dr.hint(by_ray, mode="scalar"):
+                si.duv_dy = mi.Point2f(0, kind)
             bsdf = si.bsdf(ray)
             if dr.hint(absorption, mode="scalar"):
                 with dr.resume_grad(when=not primal):
@@ -136,7 +143,7 @@ class CyclesPath(RBIntegrator):
 
             # light that the last direction meets
             ds = met_light(scene, si, previous)
-            beyond = active & (left < self.max_depth) if known else active
+            beyond = active & ((left < self.max_depth) | (passages > 0)) if known else active
             seen = beyond & ~((bounce == 0) & hidden & ~si.is_valid())
             light_density = scene.pdf_emitter_direction(previous, ds, seen & ~delta)
             emission = ds.emitter.eval(si, seen)
@@ -164,7 +171,7 @@ class CyclesPath(RBIntegrator):
                 direct = direct * clamp_factor(self.clamp_indirect, first * direct / survival, bounce >= 1)
             else:
                 ds, light, _, ways = sample_light(scene, shadows, si, on_light, scatters, None, passages, inside)
-                si.duv_dy = mi.Point2f(dr.select(is_unsampled(ds), 1, 0), 0)
+                si.duv_dy = mi.Point2f(dr.select(is_unsampled(ds), 1, 0), kind if by_ray else 0)
                 lit = scatters & (ds.pdf > 0) & mi.has_flag(bsdf.flags(), mi.BSDFFlags.Smooth)
                 if dr.hint(terminator.bends, mode="scalar"):
                     light *= terminator.bend(si, si.to_local(ds.d), lit)
@@ -218,6 +225,8 @@ class CyclesPath(RBIntegrator):
             sent = counts if shadows.lets_through else goes_on
             left[sent] -= 1
             passages[goes_on & ~counts] += 1
+            if dr.hint(by_ray, mode="scalar"):
+                kind = dr.select(counts, kind_of_ray(bs.sampled_type), kind)
             straight_on = mi.Bool(is_straight)
             done = (diffuse > self.limits[0]) | (glossy > self.limits[1]) | (through > self.limits[2])
             left = dr.select(done, dr.minimum(left, 1), left)

@@ -22,6 +22,7 @@ import mitsuba as mi
 import numpy as np
 
 from ...material.arrays.own_memory import own_memory
+from ...material.plugins.by_ray import SHADOW, is_by_ray
 from .absorption import Absorption, Inside
 from .ray_starts import RayStarts, lets_through
 from .smooth_facets import TRANSMITS, ShadowTerminator, leaves_on, shape_number, shape_table
@@ -56,6 +57,7 @@ class ShadowRays:
         # surfaces that light goes straight through; Mitsuba's integrators block all light
         self.most = int(getattr(scene.integrator(), "transparent_bounces", 0))
         self.lets_through = lets_through(scene, mi.BSDFFlags.Null)
+        self._by_ray = is_by_ray(scene)
 
     def passed(
         self,
@@ -124,6 +126,8 @@ class ShadowRays:
             segment = dr.select(active, dr.select(si.is_valid(), si.t, ray.maxt), 0)
             lengths = absorption.further(lengths, inside, segment)
             active &= si.is_valid()
+            if self._by_ray:
+                si.duv_dy = mi.Point2f(0, SHADOW)
             bsdf = si.bsdf()
             share = mi.Color3f(bsdf.eval_null_transmission(si, active))
             own = active & (bsdf == of)

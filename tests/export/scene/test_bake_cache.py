@@ -68,13 +68,13 @@ def node(item: Any, kind: str) -> Any:
     return next(n for n in [*tree_of(item).nodes, *inner] if n.bl_idname == f"ShaderNode{kind}")
 
 
-def key_of(item: Any, size: int = 64) -> str | None:
+def key_of(item: Any, size: int = 64, rays: str = "scattered") -> str | None:
     scene = bpy.context.scene
     bpy.context.view_layer.update()
     depsgraph = bpy.context.evaluated_depsgraph_get()
     for instance in depsgraph.object_instances:
         if instance.object.original == item:
-            return surface_key(scene, instance, depsgraph, 0, size)
+            return surface_key(scene, instance, depsgraph, 0, size, rays)
     raise AssertionError
 
 
@@ -158,6 +158,7 @@ def test_each_change_is_another_key(ball: Any, change: str) -> None:
 def test_the_size_and_what_does_not_count(ball: Any) -> None:
     before = key_of(ball)
     assert key_of(ball, 128) != before
+    assert key_of(ball, rays="glossy") != before
     node(ball, "ValToRGB").location.x += 10.0
     node(ball, "TexNoise").label = "Rust"
     bpy.context.scene.frame_set(7)

@@ -1,0 +1,136 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The Mitsuba BSDF `by_ray`: a surface that is something else to other rays, as nodes of Blender's Light Path have it.
+
+Choose the variant before importing this. Nested BSDFs are named by the rays that meet them (`RAYS`); `scattered` is
+for all that have none of their own. Integrators write the number of a ray's kind into `si.duv_dy.y`.
+"""
+
+# pyright: reportArgumentType=false, reportCallIssue=false, reportOperatorIssue=false
+# pyright: reportIncompatibleMethodOverride=false
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import Any
+
+import drjit as dr
+import mitsuba as mi
+
+PLUGIN_NAME = "by_ray"
+# By number: from the camera, after a diffuse bounce, after a glossy one, bent through a surface, and towards a light
+RAYS = ("camera", "scattered", "glossy", "transmission", "shadow")
+CAMERA, SCATTERED, GLOSSY, TRANSMISSION, SHADOW = range(len(RAYS))
+DIFFUSE = mi.BSDFFlags.DiffuseReflection | mi.BSDFFlags.DiffuseTransmission
+THROUGH = mi.BSDFFlags.GlossyTransmission | mi.BSDFFlags.DeltaTransmission
+
+
+class ByRay(mi.BSDF):
+    """Asks the BSDF of a ray's kind."""
+
+    def __init__(self, props: mi.Properties) -> None:
+        mi.BSDF.__init__(self, props)
+        self._looks = {number: props[name] for number, name in enumerate(RAYS) if name in props}
+        components = [self._looks[n].flags(k) for n in self._looks for k in range(self._looks[n].component_count())]
+        self.m_components = components
+        self.m_flags = 0
+        for flags in components:
+            self.m_flags |= flags
+
+    @property
+    def absorbing(self) -> Any:
+        """The material whose volume is inside, None where there is none."""
+        return next((look.absorbing for look in self._looks.values() if getattr(look, "absorbing", None)), None)
+
+    def traverse(self, callback: Any) -> None:
+        """Show the nested BSDFs."""
+        for number, look in self._looks.items():
+            callback.put(RAYS[number], look, mi.ParamFlags.Differentiable)
+
+    def eval(self, ctx: mi.BSDFContext, si: mi.SurfaceInteraction3f, wo: mi.Vector3f, active: Any = True) -> Any:
+        """f_r |cos|, RGB."""
+        value = mi.Color3f(0)
+        for look, here in self._of(si, active):
+            value = dr.select(here, mi.Color3f(look.eval(ctx, si, wo, here)), value)
+        return value
+
+    def pdf(self, ctx: mi.BSDFContext, si: mi.SurfaceInteraction3f, wo: mi.Vector3f, active: Any = True) -> Any:
+        """Density of `sample` per solid angle."""
+        density = mi.Float(0)
+        for look, here in self._of(si, active):
+            density = dr.select(here, look.pdf(ctx, si, wo, here), density)
+        return density
+
+    def eval_pdf(
+        self, ctx: mi.BSDFContext, si: mi.SurfaceInteraction3f, wo: mi.Vector3f, active: Any = True
+    ) -> tuple[Any, Any]:
+        """`eval` and `pdf`."""
+        value, density = mi.Color3f(0), mi.Float(0)
+        for look, here in self._of(si, active):
+            own, likely = look.eval_pdf(ctx, si, wo, here)
+            value, density = dr.select(here, mi.Color3f(own), value), dr.select(here, likely, density)
+        return value, density
+
+    def sample(
+        self,
+        ctx: mi.BSDFContext,
+        si: mi.SurfaceInteraction3f,
+        sample1: Any,
+        sample2: mi.Point2f,
+        active: Any = True,
+    ) -> tuple[mi.BSDFSample3f, Any]:
+        """A direction and value over density."""
+        bs, weight = dr.zeros(mi.BSDFSample3f), mi.Color3f(0)
+        for look, here in self._of(si, active):
+            drawn, own = look.sample(ctx, si, sample1, sample2, here)
+            bs, weight = dr.select(here, drawn, bs), dr.select(here, mi.Color3f(own), weight)
+        return bs, weight
+
+    def eval_null_transmission(self, si: mi.SurfaceInteraction3f, active: Any = True) -> Any:
+        """Share of light that passes unchanged."""
+        value = mi.Color3f(0)
+        for look, here in self._of(si, active):
+            value = dr.select(here, mi.Color3f(look.eval_null_transmission(si, here)), value)
+        return value
+
+    def eval_diffuse_reflectance(self, si: mi.SurfaceInteraction3f, active: Any = True) -> Any:
+        """That of what scattered rays meet."""
+        return self._looks[SCATTERED].eval_diffuse_reflectance(si, active)
+
+    def emission_share(self, si: mi.SurfaceInteraction3f, active: Any = True, *, sampled: bool = False) -> mi.Color3f:
+        """What layers leave of the surface's own light, as of scattered rays: all see the same."""
+        look = self._looks[SCATTERED]
+        if hasattr(look, "emission_share"):
+            return look.emission_share(si, active, sampled=sampled)
+        return 1 - mi.Color3f(look.eval_null_transmission(si, active))
+
+    def to_string(self) -> str:
+        """Short description."""
+        return f"ByRay[{', '.join(RAYS[number] for number in self._looks)}]"
+
+    def _of(self, si: mi.SurfaceInteraction3f, active: Any) -> Iterator[tuple[Any, mi.Bool]]:
+        """The BSDFs, and where each is asked."""
+        others = mi.Bool(active)
+        for number, look in self._looks.items():
+            if number != SCATTERED:
+                here = mi.Bool(active) & (si.duv_dy.y == number)
+                others &= ~here
+                yield look, here
+        yield self._looks[SCATTERED], others
+
+
+def kind_of_ray(sampled_type: Any) -> mi.Float:
+    """The number of a ray's kind that left a surface by lobes of this type, in place of a straight passage's."""
+    diffuse = (sampled_type & DIFFUSE) != 0
+    return dr.select(
+        diffuse, mi.Float(SCATTERED), dr.select((sampled_type & THROUGH) != 0, mi.Float(TRANSMISSION), GLOSSY)
+    )
+
+
+def is_by_ray(scene: mi.Scene) -> bool:
+    """Whether some surface of a scene asks for the kind of a ray."""
+    return any(isinstance(shape.bsdf(), ByRay) for shape in scene.shapes())
+
+
+def register() -> None:
+    """Make `by_ray` known to Mitsuba in the current variant."""
+    mi.register_bsdf(PLUGIN_NAME, ByRay)
