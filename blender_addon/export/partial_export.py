@@ -25,7 +25,7 @@ from .materials.chosen_values import by_graph, request_of, write_copy
 from .materials.node_graph import FOLDER as GRAPH_FOLDER
 from .materials.node_graph import NodeGraph, evaluate_graph, largest_leaf, probe_for
 from .materials.read_material import with_default_tangent
-from .materials.wanted_values import WantedValues, fits_of_each, wanted_values
+from .materials.wanted_values import WantedValues, fits_of_each, through_glass, wanted_values
 from .meshes.known_meshes import KnownMeshes
 from .nodes.leaf_kinds import default_names
 from .nodes.target_shader import TargetShader, target_shader
@@ -138,6 +138,10 @@ def partial_export(
             assert obj is not None
             if len(data.unseen) == len(fitted):
                 raise NotShownError(data.unseen[0])
+            for number, glass in data.behind.items():
+                if glass:
+                    described = data.materials[target_bsdf(number)]
+                    wanted[number] = through_glass(wanted[number], described, glass, findings)
             fits = []
             for number, each in enumerate(fitted):
                 fits.append(_read_values(data, context, each, number, wanted[number], findings))
@@ -148,7 +152,9 @@ def partial_export(
             for said in picture.notes if picture is not None else ():
                 findings.note(said, explains=False)  # a wrong view shows around the target, too
             inside = [
-                request_of(context, each, data.materials[target_bsdf(k)], own.values, region, data.origin)
+                {}
+                if data.behind.get(k)  # no value inside its nodes can be fitted
+                else request_of(context, each, data.materials[target_bsdf(k)], own.values, region, data.origin)
                 for k, (each, own) in enumerate(zip(fitted, wanted, strict=True))
             ]
             # all pictures are evaluated in the first one's copy, as it was read

@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 
 from ..export.camera.camera_model import Region
 from ..export.camera.render_region import region_settings, square_size
-from ..export.nodes.clear_objects import bends_light, nodes_of
+from ..export.nodes.clear_objects import bends_light, nodes_of, passes_light
 from ..versions import save_as_multilayer
 from .plain_exr import read_plain_exr
 
@@ -256,7 +256,9 @@ def _settings(scene: bpy.types.Scene, layer: bpy.types.ViewLayer, frame: Frame, 
 
 def _is_glass(item: bpy.types.Object) -> bool:
     """Whether light goes through an object by a bend, and nothing of it is looked at."""
-    return bends_light(item) and not any(node.bl_idname == "ShaderNodeOutputAOV" for node in nodes_of(item))
+    return (bends_light(item) or passes_light(item)) and not any(
+        node.bl_idname == "ShaderNodeOutputAOV" for node in nodes_of(item)
+    )
 
 
 def _joined(channels: dict[str, NDArray[np.float32]], name: str) -> NDArray[np.float32]:

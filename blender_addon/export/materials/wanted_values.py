@@ -4,7 +4,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from difflib import get_close_matches
 from typing import Any
 
@@ -12,6 +12,7 @@ from ...graph_values.mix_values import inside_values
 from ...graph_values.table import GraphValue, one_word, plain_name
 from ..findings import ExportError, Findings
 from ..fitted_slot import FittedSlot
+from ..material_model import Material
 from ..nodes.target_shader import target_shader
 from .chosen_leaves import named_mix_values
 from .chosen_values import chosen_graph_values
@@ -47,6 +48,26 @@ def wanted_values(fitted: FittedSlot, fit: dict[str, Any], findings: Findings, l
     of_mix, rest = named_mix_values(fitted.material, fit)
     values, of_sockets = chosen_graph_values(fitted.material, rest, findings, leaf=leaf)
     return WantedValues(values, of_mix, of_sockets)
+
+
+def through_glass(wanted: WantedValues, material: Material, glass: str, findings: Findings) -> WantedValues:
+    """What is left of it where the camera sees a material through `glass` alone: the values of its sockets.
+
+    Paths that are bent before they meet the target carry no slopes of values inside nodes. Those that were named are an
+    error.
+    """
+    if material.scattering:
+        findings.note(f"Material '{material.name}': Subsurface is fitted as diffuse, for it is seen through '{glass}'.")
+    inside = [*(value.name for value in wanted.values), *wanted.of_mix]
+    if not inside:
+        return wanted
+    reason = f"the camera sees it through '{glass}' alone"
+    if isinstance(wanted.fit.get("parameters", "all"), str):
+        held = ", ".join(inside)
+        findings.note(f"Values inside nodes of material '{material.name}' ({held}) stay as they are: {reason}.")
+    else:
+        findings.error(f"{', '.join(inside)} cannot be fitted: {reason}.")
+    return replace(wanted, values=[], of_mix=[])
 
 
 def fits_of_each(fitted: Sequence[FittedSlot], fit: dict[str, Any], *, several: bool) -> list[dict[str, Any]]:

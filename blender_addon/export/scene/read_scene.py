@@ -166,13 +166,13 @@ def _read(
         if not all(pieces):
             return None
         for number, each in enumerate(fitted):
-            of_one = Findings()
-            seen = check_visible(data, pieces[number], each.object, each.slot, scene, depsgraph, of_one)
+            of_one, of = Findings(), (pieces[number], each.object, each.slot)
+            seen, data.behind[number] = check_visible(data, *of, scene, depsgraph, of_one)
             walk.seen[each.object.name] = np.concatenate([walk.seen.get(each.object.name, seen[:0]), seen])
-            if of_one.errors:
-                data.unseen[number] = of_one.errors[0]
+            for said in of_one.errors[:1]:
+                data.unseen[number] = said
                 if not may_miss:
-                    findings.error(of_one.errors[0], *of_one.fixes[of_one.errors[0]])
+                    findings.error(said, *of_one.fixes[said])
         for name, points in met_points(data, scene, depsgraph).items():
             walk.seen[name] = np.concatenate([walk.seen.get(name, points[:0]), points])
     return walk

@@ -102,6 +102,8 @@ class SceneData:
     origin: NDArray[np.float64] = field(default_factory=lambda: np.zeros(3))
     # why no ray of the camera was found for a fitted material, by its number
     unseen: dict[int, str] = field(default_factory=dict)
+    # what bends all views of a fitted material, "" where one is straight
+    behind: dict[int, str] = field(default_factory=dict)
 
     @property
     def target(self) -> Shape | None:

@@ -29,10 +29,6 @@ RAYS = 12  # along each side of the frame, where it is looked for what lies in o
 BEHIND = 1e-6
 MOST_BEHIND = 8  # surfaces on such a ray: two walls of a bottle, a drink in it, and what it stands on
 OUTSIDE = "The camera does not see '{obj}': move it into the frame."
-BEHIND_GLASS = (
-    "The camera sees '{obj}' through '{glass}' alone, and a fit looks at what is seen without glass before it: turn "
-    "Ray Visibility > Camera of '{glass}' off, and render the reference so."
-)
 MIX = "ShaderNodeMixShader"  # whose other side may let light straight on
 
 
@@ -44,10 +40,11 @@ def check_visible(
     scene: bpy.types.Scene,
     depsgraph: bpy.types.Depsgraph,
     findings: Findings,
-) -> NDArray[np.float64]:
+) -> tuple[NDArray[np.float64], str]:
     """Report an error if none of the target's `pieces` lies in the frame, or everything in the frame is hidden.
 
-    Returns points (n, 3) of the target that a ray from the camera meets before all else, at most `MOST_SEEN`.
+    Returns points (n, 3) of the target that a ray from the camera meets before all else, at most `MOST_SEEN`, and the
+    name of what bends all views of it, "" where one is straight.
     """
     camera = data.camera
     seen: list[NDArray[np.float64]] = []
@@ -58,7 +55,7 @@ def check_visible(
         behind = (corner_depths < camera.clip_start).all() or (corner_depths > camera.clip_end).all()
         if behind or camera.beside(corners):
             findings.error(OUTSIDE.format(obj=target.name), *_whole_frame(camera))
-        return np.empty((0, 3))
+        return np.empty((0, 3)), ""
     probed = inside[np.linspace(0, len(inside) - 1, min(len(inside), PROBES)).astype(int)]
     probed = np.random.default_rng(0).permutation(probed)  # the first few are of all faces
     is_seen, is_plain, blocker, glass = False, False, "", ""
@@ -76,11 +73,9 @@ def check_visible(
             blocker = hit.name
         if is_plain and (number >= MOST_SEEN or len(seen) == MOST_SEEN):
             break
-    if is_seen and not is_plain:
-        findings.error(BEHIND_GLASS.format(obj=target.name, glass=glass))
-    elif not is_seen:
+    if not is_seen:
         findings.error(f"The camera does not see '{target.name}': it is hidden behind '{blocker}'.")
-    return np.array(seen).reshape(-1, 3)
+    return np.array(seen).reshape(-1, 3), "" if is_plain else glass
 
 
 def say_no_faces(fitted: FittedSlot, view_layer: bpy.types.ViewLayer, left_out: int, findings: Findings) -> None:

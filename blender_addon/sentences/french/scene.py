@@ -144,7 +144,7 @@ SCENE = {
     "Object '{}' is hidden from {} rays; in the fit it is not.": "L'objet '{}' est caché aux rayons {} ; dans l'ajustement il ne l'est pas.",
     "Object '{}' is not in the view layer '{}' of scene '{}'.": "L'objet '{}' n'est pas dans le calque de vue '{}' de la scène '{}'.",
     "The camera does not see '{}': it is hidden behind '{}'.": "La caméra ne voit pas '{}' : il est caché derrière '{}'.",
-    "The camera sees '{}' through '{}' alone, and a fit looks at what is seen without glass before it: turn Ray Visibility > Camera of '{}' off, and render the reference so.": "La caméra ne voit '{}' qu'à travers '{}', et un ajustement regarde ce qui se voit sans verre devant : désactiver Visibilité des rayons > Caméra de '{}' et rendre la référence ainsi.",
+    "Material '{}': Subsurface is fitted as diffuse, for it is seen through '{}'.": "Matériau '{}' : Subsurface est ajusté comme diffus, car on le voit à travers '{}'.",
     "The camera does not see '{}': move it into the frame.": "La caméra ne voit pas '{}' : le mettre dans le cadre.",
     "The hair '{}' of '{}' is left out.": "Les poils '{}' de '{}' sont omis.",
     "The object to fit is {}: select an object with faces.": "L'objet à ajuster est {} : sélectionner un objet avec des faces.",

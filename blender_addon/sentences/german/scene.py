@@ -145,7 +145,7 @@ SCENE = {
     "Object '{}' is hidden from {} rays; in the fit it is not.": "Objekt '{}' ist vor {} Strahlen verborgen; in der Anpassung nicht.",
     "Object '{}' is not in the view layer '{}' of scene '{}'.": "Objekt '{}' ist nicht im View-Layer '{}' der Szene '{}'.",
     "The camera does not see '{}': it is hidden behind '{}'.": "Die Kamera sieht '{}' nicht: es ist hinter '{}' verborgen.",
-    "The camera sees '{}' through '{}' alone, and a fit looks at what is seen without glass before it: turn Ray Visibility > Camera of '{}' off, and render the reference so.": "Die Kamera sieht '{}' nur durch '{}', und eine Anpassung betrachtet, was ohne Glas davor zu sehen ist: Strahlensichtbarkeit > Kamera von '{}' ausschalten und die Referenz so rendern.",
+    "Material '{}': Subsurface is fitted as diffuse, for it is seen through '{}'.": "Material '{}': Subsurface wird als diffus angepasst, denn es ist durch '{}' zu sehen.",
     "The camera does not see '{}': move it into the frame.": "Die Kamera sieht '{}' nicht: es ins Bild bewegen.",
     "The hair '{}' of '{}' is left out.": "Das Haar '{}' von '{}' wird weggelassen.",
     "The object to fit is {}: select an object with faces.": "Das anzupassende Objekt ist {}: ein Objekt mit Flächen auswählen.",

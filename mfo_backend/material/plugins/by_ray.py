@@ -16,16 +16,15 @@ from typing import Any
 import drjit as dr
 import mitsuba as mi
 
+from .ray_kinds import RAYS, SCATTERED
+
 PLUGIN_NAME = "by_ray"
-# By number: from the camera, after a diffuse bounce, after a glossy one, bent through a surface, and towards a light
-RAYS = ("camera", "scattered", "glossy", "transmission", "shadow")
-CAMERA, SCATTERED, GLOSSY, TRANSMISSION, SHADOW = range(len(RAYS))
-DIFFUSE = mi.BSDFFlags.DiffuseReflection | mi.BSDFFlags.DiffuseTransmission
-THROUGH = mi.BSDFFlags.GlossyTransmission | mi.BSDFFlags.DeltaTransmission
 
 
 class ByRay(mi.BSDF):
     """Asks the BSDF of a ray's kind."""
+
+    tells_rays = True
 
     def __init__(self, props: mi.Properties) -> None:
         mi.BSDF.__init__(self, props)
@@ -116,19 +115,6 @@ class ByRay(mi.BSDF):
                 others &= ~here
                 yield look, here
         yield self._looks[SCATTERED], others
-
-
-def kind_of_ray(sampled_type: Any) -> mi.Float:
-    """The number of a ray's kind that left a surface by lobes of this type, in place of a straight passage's."""
-    diffuse = (sampled_type & DIFFUSE) != 0
-    return dr.select(
-        diffuse, mi.Float(SCATTERED), dr.select((sampled_type & THROUGH) != 0, mi.Float(TRANSMISSION), GLOSSY)
-    )
-
-
-def is_by_ray(scene: mi.Scene) -> bool:
-    """Whether some surface of a scene asks for the kind of a ray."""
-    return any(isinstance(shape.bsdf(), ByRay) for shape in scene.shapes())
 
 
 def register() -> None:

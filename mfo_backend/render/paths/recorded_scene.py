@@ -96,6 +96,8 @@ class RecordedScene:
         self._integrator = renderer.scene.integrator()
         if renderer.shape.is_emitter() and getattr(self._integrator, "hide_emitters", False):
             raise UnrecordableError("The target emits light and the integrator hides what does.")
+        if renderer.is_behind_glass:
+            raise UnrecordableError("The camera sees the target through glass.")
         self.renderer = renderer
         self._covered, self._part, self._counts = covered, part, counts
         self._taken = 0  # bytes for the rays of the largest recording so far

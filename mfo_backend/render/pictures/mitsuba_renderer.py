@@ -174,11 +174,18 @@ class MitsubaRenderer:
             self._mask = self._find_target()
         return self._mask.copy()
 
+    @property
+    def is_behind_glass(self) -> bool:
+        """Whether the camera sees the target through others alone; the mask is then where it does."""
+        self.target_mask()
+        return self._is_behind
+
     def _find_target(self) -> NDArray[np.bool_]:
         import drjit as dr
         import mitsuba as mi
 
-        from ..camera.sensor_rays import sensor_ray  # can be imported when a variant is set
+        from ..camera.seen_through import seen_through  # can be imported when a variant is set
+        from ..camera.sensor_rays import sensor_ray
         from ..transport.camera_view import CameraView
 
         width, height = (int(n) for n in self._sensor.film().crop_size())
@@ -192,13 +199,19 @@ class MitsubaRenderer:
         if self._sensor.needs_aperture_sample():  # those of a pixel lie apart on it
             along = (0.5 + mi.Float(of_pixel) * step for step in _PLASTIC)
             on_lens = mi.Point2f(*(number - dr.floor(number) for number in along))
-        surface = CameraView(self._scene).met(sensor_ray(self._sensor, position, on_lens))
+        ray = sensor_ray(self._sensor, position, on_lens)
+        surface = CameraView(self._scene).met(ray)
         target = mi.ShapePtr(self.shape)
         dr.make_opaque(target)  # its number in this process is no part of the kernel
-        hit = surface.is_valid() & (surface.shape == target)
-        seen = dr.zeros(mi.UInt32, width * height)
-        dr.scatter(seen, mi.UInt32(1), pixel, hit)
-        return seen.numpy().reshape(height, width) > 0
+
+        def pixels_of(hit: Any) -> NDArray[np.bool_]:
+            seen = dr.zeros(mi.UInt32, width * height)
+            dr.scatter(seen, mi.UInt32(1), pixel, hit)
+            return seen.numpy().reshape(height, width) > 0
+
+        mask = pixels_of(surface.is_valid() & (surface.shape == target))
+        self._is_behind = not mask.any()
+        return pixels_of(seen_through(self._scene, target, ray)) if self._is_behind else mask
 
     def _update(self, vector: Vector, *, differentiable: bool) -> Any:
         """Put `vector` into the scene anew: the plugin derives values (IOR from specular) in the update's own graph."""

@@ -23,7 +23,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...material.arrays.own_memory import own_memory
-from ...material.plugins.by_ray import CAMERA, is_by_ray, kind_of_ray
+from ...material.plugins.ray_kinds import CAMERA, is_by_ray, kind_of_ray
 from ...types.errors import UnrecordableError
 from ..camera.primary_rays import camera_ray, through_filter
 from ..lamps.met_lamps import SceneLamps, alone

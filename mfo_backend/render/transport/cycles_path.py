@@ -20,8 +20,8 @@ import drjit as dr
 import mitsuba as mi
 from mitsuba.ad.integrators.common import RBIntegrator  # pyright: ignore[reportMissingImports]
 
-from ...material.plugins.by_ray import CAMERA, SCATTERED, is_by_ray, kind_of_ray
 from ...material.plugins.material_kinds import MaterialKinds
+from ...material.plugins.ray_kinds import CAMERA, SCATTERED, is_by_ray, kind_of_ray
 from ...types.light_paths import NO_LIMIT, TRANSPARENT_BOUNCES, LightPaths
 from ..lamps.met_lamps import SceneLamps, alone
 from .absorption import Inside

@@ -22,7 +22,7 @@ import mitsuba as mi
 import numpy as np
 
 from ...material.arrays.own_memory import own_memory
-from ...material.plugins.by_ray import SHADOW, is_by_ray
+from ...material.plugins.ray_kinds import SHADOW, is_by_ray
 from .absorption import Absorption, Inside
 from .ray_starts import RayStarts, lets_through
 from .smooth_facets import TRANSMITS, ShadowTerminator, leaves_on, shape_number, shape_table

@@ -12,8 +12,8 @@ from typing import Any
 import drjit as dr
 import mitsuba as mi
 
-from ...material.plugins.by_ray import GLOSSY, SCATTERED, is_by_ray
 from ...material.plugins.material_kinds import MaterialKinds
+from ...material.plugins.ray_kinds import GLOSSY, SCATTERED, is_by_ray
 from ...types.light_paths import LightPaths
 
 

@@ -90,7 +90,7 @@ def test_an_object_may_hide_its_own_slot(lit: Any, export: Any) -> None:
 
 
 @pytest.mark.parametrize(
-    ("sockets", "is_refused"),
+    ("sockets", "bends"),
     [
         ({"Transmission_Weight": 1.0}, True),
         ({"Transmission_Weight": 1.0, "Alpha": 0.5}, False),
@@ -98,16 +98,24 @@ def test_an_object_may_hide_its_own_slot(lit: Any, export: Any) -> None:
     ],
     ids=["glass", "half clear glass", "half clear"],
 )
-def test_what_glass_covers_is_refused_by_its_name(
-    sockets: dict[str, float], is_refused: bool, lit: Any, export: Any
+def test_values_inside_nodes_stay_where_glass_covers_the_target(
+    sockets: dict[str, float], bends: bool, lit: Any, export: Any
 ) -> None:
-    """Such a fit ended with 'the camera does not see the target', which it does."""
-    target = add_quad("Target", 1.0, 0.0, new_material("Paint"))
+    """Whole light paths fit the values of sockets alone."""
+    material = new_material("Paint", Subsurface_Weight=0.5)
+    tree = material.node_tree
+    hue = tree.nodes.new("ShaderNodeHueSaturation")
+    tree.links.new(hue.outputs[0], tree.get_output_node("CYCLES").inputs[0].links[0].from_node.inputs["Base Color"])
+    target = add_quad("Target", 1.0, 0.0, material)
     glass = add_quad("Glass", 1.5, 1.0, new_material("Glass", **sockets))
-    if is_refused:
-        with pytest.raises(ExportError, match="The camera sees 'Target' through 'Glass' alone"):
-            export(target)
-        glass.visible_camera = False
-    export(target)
-    glass.visible_camera, glass.location.x = True, 1.0
-    export(target)  # a part of it lies beside the glass
+    reason = "the camera sees it through 'Glass' alone"
+    said = [note for note in export(target, name="covered").notes if "'Glass'" in note]
+    assert any(note.endswith(f"stay as they are: {reason}.") for note in said) == bends
+    assert any("Subsurface is fitted as diffuse" in note for note in said) == bends
+    named = {"parameters": ["Hue Saturation Value/Value"]}
+    if bends:
+        with pytest.raises(ExportError, match=f"cannot be fitted: {reason}"):
+            export(target, name="named", fit=named)
+    glass.location.x = 1.0
+    report = export(target, name="beside", fit=named)  # a part of it lies beside the glass
+    assert report.request["graph"]["values"]

@@ -33,7 +33,7 @@ def assert_equal(found: Any, wanted: Any) -> None:
 
 
 def test_each_kind_finds_its_own() -> None:
-    from mfo_backend.material.plugins.by_ray import RAYS, SHADOW
+    from mfo_backend.material.plugins.ray_kinds import RAYS, SHADOW
 
     found = by_ray(scattered=WHITE, glossy=GREY, shadow={"type": "null"})
     rng, ctx = mi.PCG32(64), mi.BSDFContext()
@@ -67,7 +67,7 @@ def test_each_kind_finds_its_own() -> None:
     ],
 )
 def test_what_a_lobe_sends_out(flag: str, kind: str) -> None:
-    from mfo_backend.material.plugins.by_ray import RAYS, kind_of_ray
+    from mfo_backend.material.plugins.ray_kinds import RAYS, kind_of_ray
 
     sampled = mi.UInt32(+getattr(mi.BSDFFlags, flag))
     assert kind_of_ray(sampled)[0] == RAYS.index(kind)
