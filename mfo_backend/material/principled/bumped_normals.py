@@ -115,7 +115,8 @@ def valid_normal(geometric: Any, view: Any, normal: Any) -> Any:
     b = 2 * (a + iz * threshold)
     root = dr.safe_sqrt(dr.square(b) - 4 * a * dr.square(threshold + iz))
     z2 = dr.clip(0.25 * (b + dr.select(ix < 0, root, -root)) / dr.maximum(a, 1e-12), 0, 1)
-    turned = dr.sqrt(1 - z2) * x_axis + dr.sqrt(z2) * geometric
+    # of a grazing view z2 is 0 or 1 to the last digit, where a plain root has an endless slope
+    turned = dr.safe_sqrt(1 - z2) * x_axis + dr.safe_sqrt(z2) * geometric
     return dr.select(dr.dot(geometric, mirrored) < threshold, turned, normal)
 
 

@@ -8,6 +8,7 @@ import mitsuba as mi
 import numpy as np
 import pytest
 
+from mfo_backend.material.arrays.dual import Dual
 from mfo_backend.material.cycles_model import cycles_model
 from mfo_backend.material.lobes.microfacet import smith_lambda
 from mfo_backend.material.lobes.sheen import VelvetLobe
@@ -42,6 +43,15 @@ def test_a_valid_normal_mirrors_the_view_above_the_mesh() -> None:
     np.testing.assert_allclose(mirrored[~kept], threshold[~kept], atol=2e-3)
     assert np.abs(dr.dot(dr.cross(found, normal), geometric).numpy()).max() < 1e-4
     np.testing.assert_allclose(dr.norm(found).numpy(), 1.0, atol=1e-4)
+
+
+def test_a_valid_normal_has_a_slope_in_grazing_views() -> None:
+    """One pixel without it, at a silhouette, took the certainty of a whole fit."""
+    x, y, _ = directions(0).numpy()
+    low = np.geomspace(1e-6, 3e-3, COUNT)
+    view = dr.normalize(mi.Vector3f(*(mi.Float(a.astype(np.float32)) for a in (x, y, low))))
+    found = valid_normal(Dual(mi.Vector3f(*UP)), Dual(view), Dual(directions(1), {0: directions(2)}))
+    assert np.isfinite(found.slopes[0].numpy()).all()
 
 
 def test_the_terminator_is_smiths_masking() -> None:
