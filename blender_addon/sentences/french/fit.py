@@ -73,6 +73,7 @@ FIT = {
     "opaque": "opaque",
     "glowing": "luisant",
     "Other kinds of material (of glass, cut out, glowing) are tried where a material is fitted alone: if this one does not match, fit it so.": "D'autres sortes de matériau (verre, découpé, luisant) sont essayées là où un matériau est ajusté seul : si celui-ci ne correspond pas, l'ajuster ainsi.",
+    "What is 0 in the material was not fitted ({}): if the reference shows it, give it a value and fit again.": "Ce qui vaut 0 dans le matériau n'a pas été ajusté ({}) : si la référence le montre, lui donner une valeur et ajuster de nouveau.",
     # several materials and pictures
     "{} materials: {}.": "{} matériaux : {}.",
     "{} looks the same as the reference": "{} ressemble à la référence",

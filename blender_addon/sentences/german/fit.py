@@ -73,6 +73,7 @@ FIT = {
     "opaque": "undurchsichtig",
     "glowing": "leuchtend",
     "Other kinds of material (of glass, cut out, glowing) are tried where a material is fitted alone: if this one does not match, fit it so.": "Andere Arten von Material (Glas, ausgeschnitten, leuchtend) werden versucht, wo ein Material allein angepasst wird: passt dieses nicht, es so anpassen.",
+    "What is 0 in the material was not fitted ({}): if the reference shows it, give it a value and fit again.": "Was im Material 0 ist, wurde nicht angepasst ({}): zeigt die Referenz es, ihm einen Wert geben und noch einmal anpassen.",
     # several materials and pictures
     "{} materials: {}.": "{} Materialien: {}.",
     "{} looks the same as the reference": "{} sieht aus wie die Referenz",

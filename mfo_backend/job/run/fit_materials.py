@@ -22,7 +22,7 @@ from ..folder.job_folder import JobFolder, clear_outputs
 from ..folder.request import Request
 from .graph_blender import HELD, GraphsOfMaterial, evaluated_graphs, refusal_of
 from .job_outcome import JobOutcome
-from .job_scene import graph_notes, load_native_code, named, of_one_material, request_materials
+from .job_scene import load_native_code, material_notes, named, of_one_material, request_materials
 from .more_pictures import JobPicture, told_of_first
 
 if TYPE_CHECKING:
@@ -120,7 +120,7 @@ def _fit(
         result = outcome.result
         alone = () if result.judgement is None or result.judgement.verdict is Verdict.SAME else (ONE_CLASS,)
         result = replace(
-            result, notes=(*notes, *of_graph.notes, *result.notes, *graph_notes(each, result), *alone), **named(each)
+            result, notes=(*notes, *of_graph.notes, *result.notes, *material_notes(each, result), *alone), **named(each)
         )
         found.append(JobOutcome(result, outcome.start_image, outcome.result_image, outcome.counted, variant, sheet))
     whole = _whole([(each.target.material, one.result) for (_, each), one in zip(inner, found, strict=True)],

@@ -23,7 +23,7 @@ from .class_trials import Fitted, with_other_classes, with_plainer, with_plainer
 from .fit_materials import fit_materials
 from .graph_blender import HELD, evaluated_graphs, refusal_of
 from .job_outcome import JobOutcome
-from .job_scene import graph_notes, load_native_code, named, of_one_material, request_materials
+from .job_scene import load_native_code, material_notes, named, of_one_material, request_materials
 from .material_classes import (
     MaterialClass,
     brightest_glow,
@@ -115,7 +115,7 @@ def fit_scene(
     result = fitted.result
     if request.light_paths is not None and result.model == "mitsuba_principled":
         result = with_notes(result, (_WITHOUT_LIGHT_PATHS,))
-    result = replace(result, notes=(*notes, *result.notes, *graph_notes(request, result)), **named(request))
+    result = replace(result, notes=(*notes, *result.notes, *material_notes(request, result)), **named(request))
     return JobOutcome(result, fitted.start_image, fitted.result_image, fitted.counted, variant, fitted.sheet)
 
 

@@ -5,9 +5,11 @@ from __future__ import annotations
 
 from typing import Any
 
+from ...material.principled.blender_selection import ASKED_FOR
 from ...material.principled.principled_dict import DIRECTIONS
+from ...material.principled.principled_parameters import SOCKET_OF_PARAMETER
 from ...types.result import FitResult
-from ...types.verdict import Verdict
+from ...types.verdict import Cause, Verdict
 from ..folder.graph_files import locate_files
 from ..folder.job_folder import JobFolder
 from ..folder.request import Request, request_to_json
@@ -22,6 +24,9 @@ _GRAPH_UNSEEN = (
 _GRAPH_FLAT = "The fit on whole light paths leaves out the normals that nodes give; pictures and errors have them."
 _GRAPH_STAYED = "The nodes have values that were not fitted ({names}): if the reference shows others, choose them, too."
 MOST_NAMED = 6  # of these values
+_NONE_OF_IT = (
+    "What is 0 in the material was not fitted ({names}): if the reference shows it, give it a value and fit again."
+)
 
 
 def load_native_code() -> str:
@@ -49,6 +54,11 @@ def named(request: Request) -> dict[str, Any]:
     return {"shader": "/".join(request.target.node), "labels": dict(request.target.labels)}
 
 
+def material_notes(request: Request, result: FitResult) -> tuple[str, ...]:
+    """What of the target's material the fit does not hold or left as it was, in sentences."""
+    return (*graph_notes(request, result), *absent_notes(request, result))
+
+
 def graph_notes(request: Request, result: FitResult) -> tuple[str, ...]:
     """What is not held of the values that nodes give the target, and which of them stayed where the result is not the
     same as the reference, in sentences."""
@@ -68,6 +78,19 @@ def graph_notes(request: Request, result: FitResult) -> tuple[str, ...]:
         more = () if len(stayed) <= MOST_NAMED else ("...",)
         notes.append(_GRAPH_STAYED.format(names=", ".join((*stayed[:MOST_NAMED], *more))))
     return tuple(notes)
+
+
+def absent_notes(request: Request, result: FitResult) -> tuple[str, ...]:
+    """What a fit of `all` leaves out because the material has none of it, where the material alone does not match."""
+    material, judgement = request.materials.get(request.target.bsdf_id), result.judgement
+    if material is None or request.target.labels or request.fit.parameters != "all":
+        return ()
+    if judgement is None or judgement.verdict is Verdict.SAME or judgement.cause is not Cause.MATERIAL:
+        return ()
+    names = [SOCKET_OF_PARAMETER[name] for name in ASKED_FOR if name not in result.recovered]
+    own = {name: material.sockets[name] for name in names if name in material.sockets}
+    absent = [name for name, socket in own.items() if socket.value == 0.0 and not socket.linked]
+    return (_NONE_OF_IT.format(names=", ".join(absent)),) if absent else ()
 
 
 def request_materials(folder: JobFolder, request: Request) -> dict[str, dict[str, Any]]:

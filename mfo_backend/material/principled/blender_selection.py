@@ -22,6 +22,8 @@ _WITH = {
     "subsurface_weight": ("subsurface_radius",),
     "absorption_density": ("absorption_density", "absorption_color"),
 }
+# Those of them that no other class of material brings (job/run/material_classes.py): a user has to give them a value
+ASKED_FOR = ("anisotropic", "thin_film_thickness", "diffuse_roughness", "subsurface_weight")
 # Without an amount of the second the first has no effect
 AMOUNT_OF = {
     "coat_roughness": "coat_weight",

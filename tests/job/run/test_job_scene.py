@@ -8,8 +8,8 @@ from typing import Any
 
 import pytest
 
-from mfo_backend.job.run.job_scene import MOST_NAMED, graph_notes
-from mfo_backend.types.verdict import Verdict
+from mfo_backend.job.run.job_scene import MOST_NAMED, absent_notes, graph_notes
+from mfo_backend.types.verdict import Cause, Verdict
 
 STAYED = tuple(f"Noise Texture/{number}" for number in range(MOST_NAMED + 2))
 
@@ -36,3 +36,26 @@ def test_values_that_stayed_are_named_where_the_result_is_not_the_same(verdict: 
 
 def test_nothing_is_said_where_it_is_the_same_or_nothing_stayed() -> None:
     assert notes(Verdict.SAME, STAYED) == notes(None, STAYED) == notes(Verdict.DIFFERENT, ()) == ()
+
+
+def said_of_absent(verdict: Verdict, cause: Cause | None, parameters: str | list[str]) -> tuple[str, ...]:
+    amounts = {"Anisotropic": 0.0, "Thin Film Thickness": 420.0, "Subsurface Weight": 0.0, "Metallic": 0.0}
+    sockets = {name: SimpleNamespace(value=value, linked=False) for name, value in amounts.items()}
+    request: Any = SimpleNamespace(
+        materials={"target_bsdf": SimpleNamespace(sockets=sockets)},
+        target=SimpleNamespace(bsdf_id="target_bsdf", labels={}), fit=SimpleNamespace(parameters=parameters),
+    )  # fmt: skip
+    judgement = SimpleNamespace(verdict=verdict, cause=cause)
+    result: Any = SimpleNamespace(
+        model="blender_principled", judgement=judgement, recovered={"metallic": 1.0, "thin_film_thickness": 300.0}
+    )
+    return absent_notes(request, result)
+
+
+def test_what_the_material_has_none_of_is_named_where_it_does_not_match() -> None:
+    """A brushed metal whose Anisotropic was 0 was close, and nothing said why."""
+    (said,) = said_of_absent(Verdict.CLOSE, Cause.MATERIAL, "all")
+    assert "(Anisotropic, Subsurface Weight)" in said
+    assert said_of_absent(Verdict.CLOSE, Cause.LIGHT, "all") == ()
+    assert said_of_absent(Verdict.SAME, None, "all") == ()
+    assert said_of_absent(Verdict.CLOSE, Cause.MATERIAL, ["roughness"]) == ()
