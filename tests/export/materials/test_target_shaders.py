@@ -174,3 +174,20 @@ def test_the_socket_of_a_glossy_bsdf_that_is_left_out_is_named(scene: Any, linke
     assert [note for note in findings.notes if "left out" in note] == [
         f"Material 'Brushed': what is linked to {linked} of '{node.name}' is left out."
     ]
+
+
+def test_a_mix_whose_other_shader_cannot_be_fitted_says_so(scene: Any) -> None:
+    """Of a lampshade's Translucent BSDF nothing can be chosen; where both reflect the other may be."""
+    for kind, said in (
+        ("Translucent", "is held, for 'Translucent BSDF' lets light through."),
+        ("Glossy", "is chosen."),
+    ):
+        material = new_material("Target")
+        tree = material.node_tree
+        mix, other = tree.nodes.new("ShaderNodeMixShader"), tree.nodes.new(f"ShaderNodeBsdf{kind}")
+        tree.links.new(principled(material).outputs[0], mix.inputs[1])
+        tree.links.new(other.outputs[0], mix.inputs[2])
+        tree.links.new(mix.outputs[0], tree.get_output_node("CYCLES").inputs["Surface"])
+        findings = Findings()
+        read_target(material, "Ball", 0, findings)
+        assert any(note.endswith(said) and "mixes shaders" in note for note in map(str, findings.notes)), kind

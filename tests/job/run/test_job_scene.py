@@ -8,7 +8,7 @@ from typing import Any
 
 import pytest
 
-from mfo_backend.job.run.job_scene import MOST_NAMED, absent_notes, graph_notes
+from mfo_backend.job.run.job_scene import MOST_NAMED, absent_notes, glow_notes, graph_notes
 from mfo_backend.types.verdict import Cause, Verdict
 
 STAYED = tuple(f"Noise Texture/{number}" for number in range(MOST_NAMED + 2))
@@ -59,3 +59,25 @@ def test_what_the_material_has_none_of_is_named_where_it_does_not_match() -> Non
     assert said_of_absent(Verdict.CLOSE, Cause.LIGHT, "all") == ()
     assert said_of_absent(Verdict.SAME, None, "all") == ()
     assert said_of_absent(Verdict.CLOSE, Cause.MATERIAL, ["roughness"]) == ()
+
+
+@pytest.mark.parametrize(
+    ("verdict", "color_linked", "strength", "said"),
+    [
+        (Verdict.DIFFERENT, True, 1.0, 1), (Verdict.SAME, True, 1.0, 0),
+        (Verdict.DIFFERENT, False, 1.0, 0), (Verdict.DIFFERENT, True, 0.0, 0),
+    ],
+)  # fmt: skip
+def test_a_glow_that_nodes_give_is_said_to_be_held(
+    verdict: Verdict, color_linked: bool, strength: float, said: int
+) -> None:
+    """A screen of another brightness was said to stand under other lamps."""
+    sockets = {
+        "Emission Color": SimpleNamespace(value=[1.0] * 3, linked=color_linked),
+        "Emission Strength": SimpleNamespace(value=strength, linked=False),
+    }
+    request: Any = SimpleNamespace(
+        materials={"target_bsdf": SimpleNamespace(sockets=sockets)}, target=SimpleNamespace(bsdf_id="target_bsdf")
+    )
+    result: Any = SimpleNamespace(judgement=SimpleNamespace(verdict=verdict))
+    assert len(glow_notes(request, result)) == said
