@@ -31,6 +31,10 @@ _GLOW_HELD = (
     "Nodes give the glow of the material, so it was not fitted: if the reference glows more or less, change Emission "
     "Strength by hand."
 )
+_LEAVES_HELD = (
+    "Other shaders of the mix kept their values ({names}): if the reference shows others, choose them, too, or change "
+    "them by hand."
+)
 
 
 def load_native_code() -> str:
@@ -60,7 +64,7 @@ def named(request: Request) -> dict[str, Any]:
 
 def material_notes(request: Request, result: FitResult) -> tuple[str, ...]:
     """What of the target's material the fit does not hold or left as it was, in sentences."""
-    return (*graph_notes(request, result), *absent_notes(request, result), *glow_notes(request, result))
+    return (*graph_notes(request, result), *absent_notes(request, result), *held_notes(request, result))
 
 
 def graph_notes(request: Request, result: FitResult) -> tuple[str, ...]:
@@ -97,18 +101,22 @@ def absent_notes(request: Request, result: FitResult) -> tuple[str, ...]:
     return (_NONE_OF_IT.format(names=", ".join(absent)),) if absent else ()
 
 
-def glow_notes(request: Request, result: FitResult) -> tuple[str, ...]:
-    """That light of the material's own which nodes give was held, where the result is not the same: no fit changes it,
-    and what it lights may seem to be lit by other lamps."""
+def held_notes(request: Request, result: FitResult) -> tuple[str, ...]:
+    """What was held and may light other things, where the result is not the same: they seem to be lit by other lamps.
+
+    That is a glow that nodes give, which no fit changes, and other shaders of a mix.
+    """
     material, judgement = request.materials.get(request.target.bsdf_id), result.judgement
     if material is None or judgement is None or judgement.verdict is Verdict.SAME:
         return ()
+    leaves = ", ".join(leaf.name for leaf in material.leaves if not leaf.free)
+    notes = [_LEAVES_HELD.format(names=leaves)] if leaves else []
     color, strength = (
         material.sockets.get(SOCKET_OF_PARAMETER[name]) for name in ("emission_color", "emission_strength")
     )
-    if color is None or strength is None or not (color.linked or strength.linked):
-        return ()
-    return (_GLOW_HELD,) if strength.linked or strength.value != 0.0 else ()
+    if color is not None and strength is not None and (color.linked or strength.linked):
+        notes += [_GLOW_HELD] if strength.linked or strength.value != 0.0 else []
+    return tuple(notes)
 
 
 def request_materials(folder: JobFolder, request: Request) -> dict[str, dict[str, Any]]:

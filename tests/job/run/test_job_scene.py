@@ -8,7 +8,7 @@ from typing import Any
 
 import pytest
 
-from mfo_backend.job.run.job_scene import MOST_NAMED, absent_notes, glow_notes, graph_notes
+from mfo_backend.job.run.job_scene import MOST_NAMED, absent_notes, graph_notes, held_notes
 from mfo_backend.types.verdict import Cause, Verdict
 
 STAYED = tuple(f"Noise Texture/{number}" for number in range(MOST_NAMED + 2))
@@ -77,7 +77,23 @@ def test_a_glow_that_nodes_give_is_said_to_be_held(
         "Emission Strength": SimpleNamespace(value=strength, linked=False),
     }
     request: Any = SimpleNamespace(
-        materials={"target_bsdf": SimpleNamespace(sockets=sockets)}, target=SimpleNamespace(bsdf_id="target_bsdf")
+        materials={"target_bsdf": SimpleNamespace(sockets=sockets, leaves=())},
+        target=SimpleNamespace(bsdf_id="target_bsdf"),
     )
     result: Any = SimpleNamespace(judgement=SimpleNamespace(verdict=verdict))
-    assert len(glow_notes(request, result)) == said
+    assert len(held_notes(request, result)) == said
+
+
+def test_other_shaders_of_a_mix_that_kept_their_values_are_named() -> None:
+    """A lampshade whose Translucent BSDF was held lit its wall otherwise: that was all that was said."""
+    leaves = tuple(
+        SimpleNamespace(name=name, free=free) for name, free in (("Silk", {}), ("Gloss", {"Roughness": "r"}))
+    )
+    request: Any = SimpleNamespace(
+        materials={"target_bsdf": SimpleNamespace(sockets={}, leaves=leaves)},
+        target=SimpleNamespace(bsdf_id="target_bsdf"),
+    )
+    different, same = (SimpleNamespace(judgement=SimpleNamespace(verdict=v)) for v in (Verdict.DIFFERENT, Verdict.SAME))
+    (said,) = held_notes(request, different)  # type: ignore[arg-type]
+    assert "(Silk)" in said
+    assert held_notes(request, same) == ()  # type: ignore[arg-type]
