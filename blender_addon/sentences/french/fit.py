@@ -74,7 +74,7 @@ FIT = {
     "glowing": "luisant",
     "Other kinds of material (of glass, cut out, glowing) are tried where a material is fitted alone: if this one does not match, fit it so.": "D'autres sortes de matériau (verre, découpé, luisant) sont essayées là où un matériau est ajusté seul : si celui-ci ne correspond pas, l'ajuster ainsi.",
     "Nodes give the glow of the material, so it was not fitted: if the reference glows more or less, change Emission Strength by hand.": "Des nœuds donnent la lueur du matériau, elle n'a donc pas été ajustée : si la référence luit plus ou moins, changer Emission Strength à la main.",
-    "Other shaders of the mix kept their values ({}): if the reference shows others, choose them, too, or change them by hand.": "D'autres shaders du mélange ont gardé leurs valeurs ({}) : si la référence en montre d'autres, les choisir aussi ou les changer à la main.",
+    "Other shaders of the mix kept their values ({}): if the reference shows others, choose them where they are offered, or change them by hand.": "D'autres shaders du mélange ont gardé leurs valeurs ({}) : si la référence en montre d'autres, les choisir là où elles sont proposées, ou les changer à la main.",
     "What is 0 in the material was not fitted ({}): if the reference shows it, give it a value and fit again.": "Ce qui vaut 0 dans le matériau n'a pas été ajusté ({}) : si la référence le montre, lui donner une valeur et ajuster de nouveau.",
     # several materials and pictures
     "{} materials: {}.": "{} matériaux : {}.",

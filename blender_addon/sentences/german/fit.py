@@ -74,7 +74,7 @@ FIT = {
     "glowing": "leuchtend",
     "Other kinds of material (of glass, cut out, glowing) are tried where a material is fitted alone: if this one does not match, fit it so.": "Andere Arten von Material (Glas, ausgeschnitten, leuchtend) werden versucht, wo ein Material allein angepasst wird: passt dieses nicht, es so anpassen.",
     "Nodes give the glow of the material, so it was not fitted: if the reference glows more or less, change Emission Strength by hand.": "Nodes geben das Leuchten des Materials, deshalb wurde es nicht angepasst: leuchtet die Referenz stärker oder schwächer, Emission Strength von Hand ändern.",
-    "Other shaders of the mix kept their values ({}): if the reference shows others, choose them, too, or change them by hand.": "Andere Shader der Mischung behielten ihre Werte ({}): zeigt die Referenz andere, auch sie wählen oder von Hand ändern.",
+    "Other shaders of the mix kept their values ({}): if the reference shows others, choose them where they are offered, or change them by hand.": "Andere Shader der Mischung behielten ihre Werte ({}): zeigt die Referenz andere, sie wählen, wo sie angeboten werden, oder von Hand ändern.",
     "What is 0 in the material was not fitted ({}): if the reference shows it, give it a value and fit again.": "Was im Material 0 ist, wurde nicht angepasst ({}): zeigt die Referenz es, ihm einen Wert geben und noch einmal anpassen.",
     # several materials and pictures
     "{} materials: {}.": "{} Materialien: {}.",

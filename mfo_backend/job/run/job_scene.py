@@ -32,8 +32,8 @@ _GLOW_HELD = (
     "Strength by hand."
 )
 _LEAVES_HELD = (
-    "Other shaders of the mix kept their values ({names}): if the reference shows others, choose them, too, or change "
-    "them by hand."
+    "Other shaders of the mix kept their values ({names}): if the reference shows others, choose them where they are "
+    "offered, or change them by hand."
 )
 
 
