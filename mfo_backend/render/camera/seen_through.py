@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Which rays of the camera find a shape behind nothing but what light goes through: glass, and what is cut out.
+"""Which pixels see a shape, and which do behind nothing but what light goes through: glass, and what is cut out.
 
 Choose the variant before importing this.
 """
@@ -11,16 +11,49 @@ Choose the variant before importing this.
 from __future__ import annotations
 
 from collections.abc import Callable
+from typing import Any
 
 import drjit as dr
 import mitsuba as mi
+import numpy as np
+from numpy.typing import NDArray
 
 from ..random_numbers.path_random import PathRandom
 from ..transport.camera_view import CameraView
 from ..transport.ray_starts import RayStarts
+from .sensor_rays import sensor_ray
 
+MASK_RAYS = 4  # rays per pixel and axis that look for the target
+PLASTIC = (0.7548776662466927, 0.5698402909980532)  # steps of the R2 sequence (Roberts 2018): even over a lens
 MOST_SURFACES = 16  # that a ray goes through: two walls of a glass case are eight. No measurement
 CLEAR = mi.BSDFFlags.Null | mi.BSDFFlags.GlossyTransmission | mi.BSDFFlags.DeltaTransmission
+
+
+def seen_pixels(scene: mi.Scene, sensor: mi.Sensor, shape: mi.Shape) -> tuple[NDArray[np.bool_], bool]:
+    """The pixels (height, width) that see a shape by a regular grid of rays, and whether through others alone."""
+    width, height = (int(n) for n in sensor.film().crop_size())
+    # one pixel's rays follow each other: the nearer the rays of a packet, the quicker
+    number, columns = dr.arange(mi.UInt32, MASK_RAYS**2 * width * height), dr.opaque(mi.UInt32, width)
+    pixel, of_pixel = number // MASK_RAYS**2, number % MASK_RAYS**2
+    corner = mi.Point2f(pixel % columns, pixel // columns)
+    within = mi.Point2f(of_pixel % MASK_RAYS, of_pixel // MASK_RAYS)
+    position = (corner + (within + 0.5) / MASK_RAYS) / dr.opaque(mi.Point2f, (width, height))
+    on_lens = mi.Point2f(0.5)
+    if sensor.needs_aperture_sample():  # those of a pixel lie apart on it
+        along = (0.5 + mi.Float(of_pixel) * step for step in PLASTIC)
+        on_lens = mi.Point2f(*(number - dr.floor(number) for number in along))
+    ray = sensor_ray(sensor, position, on_lens)
+    target = mi.ShapePtr(shape)
+    dr.make_opaque(target)  # its number in this process is no part of the kernel
+
+    def pixels_of(hit: Any) -> NDArray[np.bool_]:
+        seen = dr.zeros(mi.UInt32, width * height)
+        dr.scatter(seen, mi.UInt32(1), pixel, hit)
+        return seen.numpy().reshape(height, width) > 0
+
+    surface = CameraView(scene).met(ray)
+    mask = pixels_of(surface.is_valid() & (surface.shape == target))
+    return (mask, False) if mask.any() else (pixels_of(seen_through(scene, target, ray)), True)
 
 
 def seen_through(scene: mi.Scene, target: mi.ShapePtr, ray: mi.Ray3f) -> mi.Bool:

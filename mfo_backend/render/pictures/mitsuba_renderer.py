@@ -33,8 +33,6 @@ if TYPE_CHECKING:  # the module needs Mitsuba's variant to be set
     from .pixel_pictures import PixelPictures
 
 CAMERA_WORLD = "camera_world"  # id in the scene file, property of the integrator
-_MASK_RAYS = 4  # rays per pixel and axis that look for the target
-_PLASTIC = (0.7548776662466927, 0.5698402909980532)  # steps of the R2 sequence (Roberts 2018): even over a lens
 
 
 class MitsubaRenderer:
@@ -170,8 +168,10 @@ class MitsubaRenderer:
 
     def target_mask(self) -> NDArray[np.bool_]:
         """See `Renderer.target_mask`: a regular grid of rays in every pixel, without the pixel filter's tails."""
+        from ..camera.seen_through import seen_pixels  # can be imported when a variant is set
+
         if self._mask is None:
-            self._mask = self._find_target()
+            self._mask, self._is_behind = seen_pixels(self._scene, self._sensor, self.shape)
         return self._mask.copy()
 
     @property
@@ -179,39 +179,6 @@ class MitsubaRenderer:
         """Whether the camera sees the target through others alone; the mask is then where it does."""
         self.target_mask()
         return self._is_behind
-
-    def _find_target(self) -> NDArray[np.bool_]:
-        import drjit as dr
-        import mitsuba as mi
-
-        from ..camera.seen_through import seen_through  # can be imported when a variant is set
-        from ..camera.sensor_rays import sensor_ray
-        from ..transport.camera_view import CameraView
-
-        width, height = (int(n) for n in self._sensor.film().crop_size())
-        # one pixel's rays follow each other: the nearer the rays of a packet, the quicker
-        number, columns = dr.arange(mi.UInt32, _MASK_RAYS**2 * width * height), dr.opaque(mi.UInt32, width)
-        pixel, of_pixel = number // _MASK_RAYS**2, number % _MASK_RAYS**2
-        corner = mi.Point2f(pixel % columns, pixel // columns)
-        within = mi.Point2f(of_pixel % _MASK_RAYS, of_pixel // _MASK_RAYS)
-        position = (corner + (within + 0.5) / _MASK_RAYS) / dr.opaque(mi.Point2f, (width, height))
-        on_lens = mi.Point2f(0.5)
-        if self._sensor.needs_aperture_sample():  # those of a pixel lie apart on it
-            along = (0.5 + mi.Float(of_pixel) * step for step in _PLASTIC)
-            on_lens = mi.Point2f(*(number - dr.floor(number) for number in along))
-        ray = sensor_ray(self._sensor, position, on_lens)
-        surface = CameraView(self._scene).met(ray)
-        target = mi.ShapePtr(self.shape)
-        dr.make_opaque(target)  # its number in this process is no part of the kernel
-
-        def pixels_of(hit: Any) -> NDArray[np.bool_]:
-            seen = dr.zeros(mi.UInt32, width * height)
-            dr.scatter(seen, mi.UInt32(1), pixel, hit)
-            return seen.numpy().reshape(height, width) > 0
-
-        mask = pixels_of(surface.is_valid() & (surface.shape == target))
-        self._is_behind = not mask.any()
-        return pixels_of(seen_through(self._scene, target, ray)) if self._is_behind else mask
 
     def _update(self, vector: Vector, *, differentiable: bool) -> Any:
         """Put `vector` into the scene anew: the plugin derives values (IOR from specular) in the update's own graph."""
