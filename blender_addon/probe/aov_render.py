@@ -245,7 +245,7 @@ def _settings(scene: bpy.types.Scene, layer: bpy.types.ViewLayer, frame: Frame, 
         for item in scene.objects:
             if item.type == "LIGHT":
                 put(item, "hide_render", True)
-            elif _is_glass(item):  # behind it there would be no outputs; what it bends is found by its place
+            elif _is_clear(item):  # behind it there would be no outputs; what it bends is found by its place
                 put(item, "visible_camera", False)
         save_as_multilayer(render.image_settings)
         yield put
@@ -254,11 +254,10 @@ def _settings(scene: bpy.types.Scene, layer: bpy.types.ViewLayer, frame: Frame, 
             setattr(owner, name, value)
 
 
-def _is_glass(item: bpy.types.Object) -> bool:
-    """Whether light goes through an object by a bend, and nothing of it is looked at."""
-    return (bends_light(item) or passes_light(item)) and not any(
-        node.bl_idname == "ShaderNodeOutputAOV" for node in nodes_of(item)
-    )
+def _is_clear(item: bpy.types.Object) -> bool:
+    """Whether light goes through an object, and nothing of it is looked at."""
+    is_asked = any(node.bl_idname == "ShaderNodeOutputAOV" for node in nodes_of(item))
+    return not is_asked and (bends_light(item) or passes_light(item))
 
 
 def _joined(channels: dict[str, NDArray[np.float32]], name: str) -> NDArray[np.float32]:

@@ -18,9 +18,9 @@ SHADOW = {"Is Shadow Ray": 1.0, "Ray Depth": 1.0}
 ANSWERS = {"scattered": SCATTERED, "glossy": GLOSSY, "transmission": BENT, "shadow": SHADOW, "camera": CAMERA}
 # outputs that tell the camera's rays from all others, and nothing else
 OF_CAMERA = ("Is Camera Ray",)
+OF_SHADOW = ("Is Shadow Ray",)  # the same of rays that ask a surface for nothing but how much light it lets through
 # those that surfaces answer by the kind of the ray
 OF_RAYS = tuple(f"Is {kind} Ray" for kind in ("Camera", "Diffuse", "Glossy", "Transmission", "Reflection", "Shadow"))
-OF_SHADOW = ("Is Shadow Ray",)  # the same of rays that ask a surface for nothing but how much light it lets through
 
 
 def light_path_outputs(tree: bpy.types.NodeTree) -> set[str]:

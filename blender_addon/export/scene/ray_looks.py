@@ -38,7 +38,7 @@ def put_looks(
     if scattered not in data.materials:  # its bake has failed
         return
     others = {rays: look for rays, look in looks.items() if rays != "camera"}
-    data.materials[identifier] = _by_ray(data.materials[scattered], {"scattered": scattered} | others)
+    data.materials[identifier] = _by_ray(data.materials[scattered], {"scattered": scattered} | others, findings)
     if "camera" not in looks:
         return
     if data.materials[looks["camera"]].model != "null":
@@ -62,7 +62,7 @@ def hide_from_rays(data: SceneData, findings: Findings) -> None:
         looks = {kind: NOTHING if hides <= rays else shape.bsdf for kind, hides in HIDDEN.items()}
         looks |= dict.fromkeys(("camera", "shadow"), shape.bsdf)
         identifier = "_".join((shape.bsdf, "without", *shape.hidden.rays))
-        data.materials |= {NOTHING: Material(NOTHING, "null"), identifier: _by_ray(material, looks)}
+        data.materials |= {NOTHING: Material(NOTHING, "null"), identifier: _by_ray(material, looks, findings)}
         data.shapes[number] = replace(shape, bsdf=identifier)
 
 
@@ -72,8 +72,13 @@ def note_hidden(hidden: Hidden, findings: Findings) -> None:
         findings.note(f"Object '{hidden.owner}' is hidden from {', '.join(hidden.rays)} rays; in the fit it is not.")
 
 
-def _by_ray(material: Material, looks: Mapping[str, str]) -> Material:
+def _by_ray(material: Material, looks: Mapping[str, str], findings: Findings) -> Material:
     """A material of several looks that glows as `material` does."""
+    if material.scattering:
+        findings.note(
+            f"Material '{material.name}' is another to some rays: its Subsurface is shown as diffuse, no light travels "
+            "below the surface."
+        )
     emission = {name: socket for name, socket in material.sockets.items() if name in EMISSION}
     return Material(
         material.name, "by_ray", emission, emission_is_dimmed=material.emission_is_dimmed, by_ray=dict(looks)

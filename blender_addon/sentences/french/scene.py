@@ -154,6 +154,7 @@ SCENE = {
     "A {} has {} alone, and none of them is left to fit: choose one that has no link.": "Un {} n'a que {}, et il n'en reste aucun à ajuster : en choisir un sans lien.",
     "Bump Map Correction of material '{}' is off in Cycles; in the fit normals are corrected.": "Bump Map Correction du matériau '{}' est désactivé dans Cycles ; dans l'ajustement les normales sont corrigées.",
     "Material '{}' is another to the camera (Light Path): before the target the fit has it as diffuse rays see it.": "Le matériau '{}' est un autre pour la caméra (Light Path) : devant la cible, l'ajustement l'a comme les rayons diffus le voient.",
+    "Material '{}' is another to some rays: its Subsurface is shown as diffuse, no light travels below the surface.": "Le matériau '{}' est un autre pour certains rayons : son Subsurface est montré comme diffus, aucune lumière ne passe sous la surface.",
     "Material '{}' asks Light Path for {}: the fit has it as diffuse rays see it.": "Le matériau '{}' interroge Light Path sur {} : l'ajustement l'a comme les rayons diffus le voient.",
     "Material '{}' asks Light Path for {}: bounces have it as diffuse rays do.": "Le matériau '{}' interroge Light Path sur {} : les rebonds l'ont comme les rayons diffus.",
     "Material '{}' asks for Backfacing: bounces have one answer for both sides.": "Le matériau '{}' interroge Backfacing : les rebonds ont la même réponse pour les deux faces.",

@@ -155,6 +155,7 @@ SCENE = {
     "A {} has {} alone, and none of them is left to fit: choose one that has no link.": "Ein {} hat nur {}, und keiner davon bleibt zum Anpassen: einen ohne Verbindung wählen.",
     "Bump Map Correction of material '{}' is off in Cycles; in the fit normals are corrected.": "Bump Map Correction von Material '{}' ist in Cycles aus; in der Anpassung werden Normalen korrigiert.",
     "Material '{}' is another to the camera (Light Path): before the target the fit has it as diffuse rays see it.": "Material '{}' ist für die Kamera ein anderes (Light Path): vor dem Ziel hat die Anpassung es, wie diffuse Strahlen es sehen.",
+    "Material '{}' is another to some rays: its Subsurface is shown as diffuse, no light travels below the surface.": "Material '{}' ist für manche Strahlen ein anderes: sein Subsurface wird als diffus gezeigt, kein Licht läuft unter der Oberfläche.",
     "Material '{}' asks Light Path for {}: the fit has it as diffuse rays see it.": "Material '{}' fragt Light Path nach {}: die Anpassung hat es, wie diffuse Strahlen es sehen.",
     "Material '{}' asks Light Path for {}: bounces have it as diffuse rays do.": "Material '{}' fragt Light Path nach {}: Reflexionen haben es wie diffuse Strahlen.",
     "Material '{}' asks for Backfacing: bounces have one answer for both sides.": "Material '{}' fragt nach Backfacing: Reflexionen haben für beide Seiten dieselbe Antwort.",

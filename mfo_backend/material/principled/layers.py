@@ -44,10 +44,11 @@ GLOSSY_ANISOTROPY = (1.0 - 0.01**2) / 0.9
 class Layers:
     """Weights (RGB, compensation included) and shapes of the lobes; None where a lobe is left out.
 
-    `glass_colour` tints what glass lets through and `glass_reflected` what it reflects. `subsurface` is the
-    Lambert lobe that stands for what is `below`, where nobody walks there. `normals` are there where nodes
-    give them; then the frame is that of the microfacet lobes. `wi`, in the frame of the anisotropy, lies on the side of
-    the normal. `cos_rotation`, `sin_rotation` turn a direction of the surface's own frame into it.
+    Cycles draws coat and specular by their albedos, of light that gets to them and out again. `glass_colour` tints
+    what glass lets through and `glass_reflected` what it reflects. `subsurface` is the Lambert lobe that stands for
+    what is `below`, where nobody walks there. `normals` are there where nodes give them; then the frame is that of
+    the microfacet lobes. `wi`, in the frame of the anisotropy, lies on the side of the normal. `cos_rotation`,
+    `sin_rotation` turn a direction of the surface's own frame into it.
     """
 
     wi: Any
