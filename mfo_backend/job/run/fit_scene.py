@@ -49,7 +49,7 @@ _OF_EVERY_FIT = (
     *("...render.paths.recorded_scene", "...render.traced.traced_paths"),
     *("...render.lamps.lamp_plugins", "...render.lamps.changed_light"),
     *("...material.plugins.projective_texture", "...material.plugins.leaf_radiance"),
-    "...material.plugins.mapped_normal",
+    *("...material.plugins.mapped_normal", "...material.plugins.by_ray", "...render.camera.seen_through"),
     *("scipy.ndimage", "scipy.optimize", "PIL.Image", "PIL.ImageDraw", "PIL.ImageFont", "OpenEXR"),
 )
 _WITHOUT_LIGHT_PATHS = (

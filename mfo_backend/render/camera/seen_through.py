@@ -53,7 +53,10 @@ def seen_pixels(scene: mi.Scene, sensor: mi.Sensor, shape: mi.Shape) -> tuple[ND
 
     surface = CameraView(scene).met(ray)
     mask = pixels_of(surface.is_valid() & (surface.shape == target))
-    return (mask, False) if mask.any() else (pixels_of(seen_through(scene, target, ray)), True)
+    if mask.any():
+        return mask, False
+    mask = pixels_of(seen_through(scene, target, ray))
+    return mask, bool(mask.any())
 
 
 def seen_through(scene: mi.Scene, target: mi.ShapePtr, ray: mi.Ray3f) -> mi.Bool:

@@ -140,7 +140,10 @@ def test_few_glossy_bounces_are_said(scene: Any, export: Any, glossy: int, total
 def test_what_chance_leaves_of_dim_paths_is_clamped_as_in_cycles(
     scene: Any, export: Any, render_cycles: Callable[[], Any], mitsuba: Any, fewest: int
 ) -> None:
-    """Light of a dark pit, whose dim paths Cycles ends by chance: those that go on are brighter, and clamped sooner."""
+    """Light of a dark pit, whose dim paths Cycles ends by chance: those that go on are brighter, and clamped sooner.
+
+    How bright a sample is hangs on how often its lobe is drawn: by its Fresnel term alone 0.8 % too bright.
+    """
     scene.render.resolution_x = scene.render.resolution_y = 16
     cycles = scene.cycles
     cycles.max_bounces = cycles.diffuse_bounces = 8
@@ -155,8 +158,8 @@ def test_what_chance_leaves_of_dim_paths_is_clamped_as_in_cycles(
     add_quad("Lid", 2.0, 2.0, dark)
     add_light("SPOT", (0, 0, 1.0), (math.pi, 0, 0), energy=100.0, spot_size=0.8, shadow_soft_size=0.01)
     plain = render_cycles()
-    cycles.sample_clamp_indirect, cycles.min_light_bounces = 0.1, fewest
+    cycles.sample_clamp_indirect, cycles.min_light_bounces, cycles.samples = 0.1, fewest, 8192
     expected = render_cycles()
-    ours = picture_of(export(floor, reference=scene_reference(expected)), rounds=48)
-    assert ours.mean() == pytest.approx(expected.mean(), rel=0.006)  # three deviations of the noise of both
+    ours = picture_of(export(floor, reference=scene_reference(expected)), rounds=192)
+    assert ours.mean() == pytest.approx(expected.mean(), rel=0.005)  # two and a half deviations of the noise of both
     assert plain.mean() > 1.5 * expected.mean()

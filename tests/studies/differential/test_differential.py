@@ -112,7 +112,6 @@ def test_baked_boxes_are_as_in_cycles(seed: int, names: tuple[str, ...], tmp_pat
     [
         "instancer a holdout",
         "instancer a catcher",
-        "instancer hidden from diffuse",
         "lamp's instancer hidden from diffuse",
         "mesh light linking",
         "mesh shadow linking",
