@@ -47,7 +47,7 @@ def baked_surface(
     slot: int,
     folder: Path,
     size: int,
-    rays: str = "scattered",
+    rays: str,
 ) -> dict[str, Any]:
     """Bake the material in `slot` of a depsgraph's instance into `folder`, `size` texels along each side.
 

@@ -14,7 +14,7 @@ GLOSSY = {"Is Glossy Ray": 1.0, "Is Reflection Ray": 1.0, "Ray Depth": 1.0, "Glo
 # a bend through a surface is glossy, too (Cycles 5.0: kernel/integrator/path_state.h)
 BENT = {"Is Glossy Ray": 1.0, "Is Transmission Ray": 1.0, "Ray Depth": 1.0, "Transmission Depth": 1.0}
 SHADOW = {"Is Shadow Ray": 1.0, "Ray Depth": 1.0}
-# by the words of the backend's plugin `by_ray`; the camera's are what that has for none
+# by the words of the backend's plugin `by_ray`
 ANSWERS = {"scattered": SCATTERED, "glossy": GLOSSY, "transmission": BENT, "shadow": SHADOW, "camera": CAMERA}
 # outputs that tell the camera's rays from all others, and nothing else
 OF_CAMERA = ("Is Camera Ray",)

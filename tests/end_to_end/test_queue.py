@@ -36,6 +36,7 @@ def test_colours_of_small_things_are_found(tmp_path: Path) -> None:
     # by the noise of the picture: of six pictures three have one thing that is 0.13 to 0.16 metal, for none
     assert len(missed) <= 1
     assert all(found["verdict"] == "close" for found in missed)
+    assert all(abs(f["recovered"]["metallic"] - truth[f["object"]]["Metallic"]) < 0.2 for f in missed)
     assert np.median(colours) < 0.006
     assert np.max(colours) < 0.03
     assert np.median(roughnesses) < 0.05

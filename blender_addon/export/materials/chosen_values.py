@@ -69,11 +69,16 @@ def chosen_graph_values(
             )
     if not chosen or reason is None:
         return chosen, rest
-    if names:
-        raise ExportError(f"{', '.join(names)} cannot be fitted: {reason}.")
-    held = ", ".join(value.name for value in chosen)
-    findings.note(f"Values inside nodes of material '{material.name}' ({held}) stay as they are: {reason}.")
+    say_held(material.name, [value.name for value in chosen], reason, findings, named=bool(names))
     return [], rest
+
+
+def say_held(material: str, values: Sequence[str], reason: str, findings: Findings, *, named: bool) -> None:
+    """Say that these values inside the nodes of a material stay as they are, and why; an error if they were named."""
+    held = ", ".join(values)
+    if named:
+        raise ExportError(f"{held} cannot be fitted: {reason}.")
+    findings.note(f"Values inside nodes of material '{material}' ({held}) stay as they are: {reason}.")
 
 
 def _check_not_nodes(names: str | Sequence[str], target: TargetShader, values: Sequence[GraphValue]) -> None:

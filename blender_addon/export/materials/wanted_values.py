@@ -15,7 +15,7 @@ from ..fitted_slot import FittedSlot
 from ..material_model import Material
 from ..nodes.target_shader import target_shader
 from .chosen_leaves import named_mix_values
-from .chosen_values import chosen_graph_values
+from .chosen_values import chosen_graph_values, say_held
 
 # as Principled, Metallic and the backend call them
 _TURNING = ("anisotropic", "anisotropic_rotation", "anisotropy", "rotation")
@@ -53,20 +53,20 @@ def wanted_values(fitted: FittedSlot, fit: dict[str, Any], findings: Findings, l
 def through_glass(wanted: WantedValues, material: Material, glass: str, findings: Findings) -> WantedValues:
     """What is left of it where the camera sees a material through `glass` alone: the values of its sockets.
 
-    Paths that are bent before they meet the target carry no slopes of values inside nodes. Those that were named are an
-    error.
+    Paths that are bent before they meet the target carry no slopes of values inside nodes.
+
+    Raises
+    ------
+    ExportError
+        If one of those was named.
     """
     if material.scattering:
         findings.note(f"Material '{material.name}': Subsurface is fitted as diffuse, for it is seen through '{glass}'.")
     inside = [*(value.name for value in wanted.values), *wanted.of_mix]
     if not inside:
         return wanted
-    reason = f"the camera sees it through '{glass}' alone"
-    if isinstance(wanted.fit.get("parameters", "all"), str):
-        held = ", ".join(inside)
-        findings.note(f"Values inside nodes of material '{material.name}' ({held}) stay as they are: {reason}.")
-    else:
-        findings.error(f"{', '.join(inside)} cannot be fitted: {reason}.")
+    reason, asked = f"the camera sees it through '{glass}' alone", wanted.fit.get("parameters", "all")
+    say_held(material.name, inside, reason, findings, named=not isinstance(asked, str))
     return replace(wanted, values=[], of_mix=[])
 
 

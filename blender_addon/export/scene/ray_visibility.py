@@ -1,7 +1,10 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Which rays find an object, and what an object has that no ray of the fit does."""
+"""Which rays find an object, and as what: by Ray Visibility and by Light Path; what of it no ray of the fit finds."""
 
 from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
 
 import bpy
 
@@ -9,8 +12,15 @@ from ...versions import cycles_settings, divides_adaptively
 from ..audit.object_table import OBJECT_CYCLES
 from ..audit.rules import name_settings
 from ..findings import Findings
+from ..material_model import Material
+from ..materials.baked_material import EMISSION
 from ..meshes.read_mesh import material_of_slot
 from ..render_state import shown_by
+from .scene_data import Hidden, SceneData
+
+NOTHING = "nothing"  # id of a surface that all light passes
+# By kinds of rays: they pass an object that is hidden from all of these. A bend through a surface is glossy, too
+PASSING = {"scattered": {"diffuse"}, "glossy": {"glossy"}, "transmission": {"glossy", "transmission"}}
 
 
 def camera_misses(instance: bpy.types.DepsgraphObjectInstance, view_layer: bpy.types.ViewLayer) -> bool:
@@ -50,3 +60,72 @@ def note_visibility(instance: bpy.types.DepsgraphObjectInstance, findings: Findi
             findings.note(f"The hair '{system.name}' of '{item.name}' is left out.")
     if any(each.is_holdout or each.is_shadow_catcher for each in (item, parent)):
         findings.note(f"Object '{item.name}' is a holdout or shadow catcher; in the fit it is an object.")
+
+
+def scattered_id(identifier: str) -> str:
+    """The id of what scattered rays find at a surface that has others for other rays."""
+    return f"{identifier}_scattered"
+
+
+def put_looks(
+    data: SceneData,
+    identifier: str,
+    name: str,
+    looks: Mapping[str, str],
+    shapes: Sequence[str],
+    findings: Findings,
+) -> None:
+    """Let rays find a material as it was baked for them, by the ids of its `looks`.
+
+    Where it is nothing to the camera that passes its `shapes`; else the camera has what scattered rays find. Behind a
+    pane that bends its rays a target would be fitted on whole light paths.
+    """
+    scattered = scattered_id(identifier)
+    if scattered not in data.materials:  # its bake has failed
+        return
+    others = {rays: look for rays, look in looks.items() if rays != "camera"}
+    data.materials[identifier] = _by_ray(data.materials[scattered], {"scattered": scattered} | others, findings)
+    if "camera" not in looks:
+        return
+    if data.materials[looks["camera"]].model != "null":
+        findings.note(
+            f"Material '{name}' is another to the camera (Light Path): before the target the fit has it as diffuse "
+            "rays see it."
+        )
+        return
+    data.shapes[:] = [replace(s, camera_hidden=True) if s.identifier in shapes else s for s in data.shapes]
+
+
+def hide_from_rays(data: SceneData, findings: Findings) -> None:
+    """Let rays pass the shapes that are hidden from them; what glows is named, for lights are sampled for all."""
+    for number, shape in enumerate(data.shapes):
+        if not shape.hidden.rays:
+            continue
+        material, rays = data.materials[shape.bsdf], set(shape.hidden.rays)
+        if shape in data.emitting:
+            note_hidden(shape.hidden, findings)
+            continue
+        looks = {kind: NOTHING if hides <= rays else shape.bsdf for kind, hides in PASSING.items()}
+        looks |= dict.fromkeys(("camera", "shadow"), shape.bsdf)
+        identifier = "_".join((shape.bsdf, "without", *shape.hidden.rays))
+        data.materials |= {NOTHING: Material(NOTHING, "null"), identifier: _by_ray(material, looks, findings)}
+        data.shapes[number] = replace(shape, bsdf=identifier)
+
+
+def note_hidden(hidden: Hidden, findings: Findings) -> None:
+    """Name an object that rays find in the fit and not in Cycles."""
+    if hidden.rays:
+        findings.note(f"Object '{hidden.owner}' is hidden from {', '.join(hidden.rays)} rays; in the fit it is not.")
+
+
+def _by_ray(material: Material, looks: Mapping[str, str], findings: Findings) -> Material:
+    """A material of several looks that glows as `material` does."""
+    if material.scattering:
+        findings.note(
+            f"Material '{material.name}' is another to some rays: its Subsurface is shown as diffuse, no light travels "
+            "below the surface."
+        )
+    emission = {name: socket for name, socket in material.sockets.items() if name in EMISSION}
+    return Material(
+        material.name, "by_ray", emission, emission_is_dimmed=material.emission_is_dimmed, by_ray=dict(looks)
+    )

@@ -49,13 +49,19 @@ from ..render_state import (
 )
 from ..steps import Steps
 from .origin import moved, note_far_scattering, note_wide_scattering, scene_origin
-from .ray_looks import hide_from_rays, note_hidden
-from .ray_visibility import camera_misses, hidden_from, note_visibility, shadow_transmission
+from .ray_visibility import (
+    camera_misses,
+    hidden_from,
+    hide_from_rays,
+    note_hidden,
+    note_visibility,
+    shadow_transmission,
+)
 from .read_settings import name_render_settings, read_settings
 from .read_world import BLACK, read_world
 from .scene_bakes import SceneBakes, Surface
 from .scene_data import Hidden, SceneData, Shape, Terminator, target_bsdf, target_shape
-from .visibility import check_visible, met_points, say_no_faces
+from .visibility import look_at_targets, met_points, say_no_faces
 
 SILENT_TYPES = ("EMPTY", "ARMATURE", "LATTICE", "CAMERA", "SPEAKER", "LIGHT_PROBE")
 _NO_POINTS = np.zeros((0, 3), np.float32)
@@ -165,15 +171,8 @@ def _read(
                 findings.take_over(of_one, (each.object.name, each.slot))
         if not all(pieces):
             return None
-        for number, each in enumerate(fitted):
-            of_one, of = Findings(), (pieces[number], each.object, each.slot)
-            seen, data.behind[number] = check_visible(data, *of, scene, depsgraph, of_one)
-            walk.seen[each.object.name] = np.concatenate([walk.seen.get(each.object.name, seen[:0]), seen])
-            for said in of_one.errors[:1]:
-                data.unseen[number] = said
-                if not may_miss:
-                    findings.error(said, *of_one.fixes[said])
-        for name, points in met_points(data, scene, depsgraph).items():
+        seen = look_at_targets(data, fitted, pieces, scene, depsgraph, findings, may_miss=may_miss)
+        for name, points in (*seen, *met_points(data, scene, depsgraph).items()):
             walk.seen[name] = np.concatenate([walk.seen.get(name, points[:0]), points])
     return walk
 

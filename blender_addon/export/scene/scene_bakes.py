@@ -47,7 +47,7 @@ from ..nodes.displacement import bends_normals
 from ..nodes.graph_findings import note_missing_pictures, note_pixel_sizes
 from ..render_state import rendered_layer
 from .displaced_meshes import OTHER_FACES, DisplacedMeshes
-from .ray_looks import put_looks, scattered_id
+from .ray_visibility import put_looks, scattered_id
 from .scene_data import SceneData
 
 MOST_SURFACES = 64  # baked in one export; what comes later keeps its nearest model
@@ -172,10 +172,10 @@ class SceneBakes:
                 request |= {"size": _texels(data.camera, surface.piece), "rays": "scattered"}
                 data.materials[identifier] = grey(material.name)
                 asked = self._surfaces[identifier] = _Asked(material, item.name, request)
-                asked.looks = {rays: f"{identifier}_{of}" for rays, of in other_looks(node_tree_of(material)).items()}
-                for look in dict.fromkeys(asked.looks.values()):
-                    other = request | {"rays": look.rpartition("_")[2]}
-                    self._surfaces[look] = _Asked(material, item.name, other)
+                others = other_looks(node_tree_of(material))
+                asked.looks = {rays: f"{identifier}_{of}" for rays, of in others.items()}
+                for of in dict.fromkeys(others.values()):
+                    self._surfaces[f"{identifier}_{of}"] = _Asked(material, item.name, request | {"rays": of})
             except BakeError as problem:
                 _give_up(data, identifier, material, item.name, problem, findings)
             known[own] = identifier

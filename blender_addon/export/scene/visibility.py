@@ -28,11 +28,36 @@ RAYS = 12  # along each side of the frame, where it is looked for what lies in o
 # box of which a decal lay 0.05 mm above, and met the floor that it stands on
 BEHIND = 1e-6
 MOST_BEHIND = 8  # surfaces on such a ray: two walls of a bottle, a drink in it, and what it stands on
-# From where each of them ends, for what lights it: walls that overlapped behind the camera are black in Cycles, and a
-# room was 3.6 % too bright. Fewer: not tried
+# Rays from where each of those ends, for what lights it: walls that overlapped behind the camera are black in Cycles,
+# and a room was 3.6 % too bright. Fewer: not tried
 ONWARD = 4
 OUTSIDE = "The camera does not see '{obj}': move it into the frame."
 MIX = "ShaderNodeMixShader"  # whose other side may let light straight on
+
+
+def look_at_targets(
+    data: SceneData,
+    fitted: Sequence[FittedSlot],
+    pieces: Sequence[Sequence[Piece]],
+    scene: bpy.types.Scene,
+    depsgraph: bpy.types.Depsgraph,
+    findings: Findings,
+    *,
+    may_miss: bool,
+) -> Iterator[tuple[str, NDArray[np.float64]]]:
+    """Points (n, 3) of each target that the camera sees before all else, with its object's name.
+
+    Which targets it does not see, an error unless it `may_miss` some, and which through what bends light is put into
+    `data`.
+    """
+    for number, (each, own) in enumerate(zip(fitted, pieces, strict=True)):
+        of_one = Findings()
+        seen, data.behind[number] = check_visible(data, own, each.object, each.slot, scene, depsgraph, of_one)
+        if of_one.errors:
+            data.unseen[number] = of_one.errors[0]
+            if not may_miss:
+                findings.error(of_one.errors[0], *of_one.fixes[of_one.errors[0]])
+        yield each.object.name, seen
 
 
 def check_visible(
@@ -124,16 +149,29 @@ def met_points(
                 break
             found.setdefault(item.name, []).append(np.array(at) - data.origin)
             if not _lets_light_through(item):
-                side = -np.array(normal) * np.sign(np.array(normal) @ direction)
-                from_it = np.array(at) + BEHIND * float(np.linalg.norm(np.array(at) - begin)) * side
-                for sent in random.normal(size=(ONWARD, 3)):
-                    by_cosine = Vector(sent + np.linalg.norm(sent) * side)
-                    hit, at, _, _, item, _ = scene.ray_cast(depsgraph, Vector(from_it), by_cosine)
-                    if hit:
-                        found.setdefault(item.name, []).append(np.array(at) - data.origin)
+                outward = np.array(normal, np.float64)
+                side = -outward * np.sign(outward @ direction)
+                away = BEHIND * float(np.linalg.norm(np.array(at) - begin))
+                for name, there in _met_from(scene, depsgraph, np.array(at) + away * side, side, random):
+                    found.setdefault(name, []).append(there - data.origin)
                 break
             start = begin + (1.0 + BEHIND) * (np.array(at) - begin)
     return {name: np.array(points) for name, points in found.items()}
+
+
+def _met_from(
+    scene: bpy.types.Scene,
+    depsgraph: bpy.types.Depsgraph,
+    start: NDArray[np.float64],
+    normal: NDArray[np.float64],
+    random: np.random.Generator,
+) -> Iterator[tuple[str, NDArray[np.float64]]]:
+    """What `ONWARD` rays by the cosine about a normal meet, by its name, and where."""
+    for sent in random.normal(size=(ONWARD, 3)):
+        direction = sent + np.linalg.norm(sent) * normal
+        hit, at, _, _, item, _ = scene.ray_cast(depsgraph, Vector(start), Vector(direction))
+        if hit:
+            yield item.name, np.array(at)
 
 
 def _is_put_away(item: bpy.types.Object) -> bool:

@@ -11,6 +11,8 @@ for all that have none of their own. Integrators write the number of a ray's kin
 from __future__ import annotations
 
 from collections.abc import Iterator
+from functools import reduce
+from operator import or_
 from typing import Any
 
 import drjit as dr
@@ -24,16 +26,14 @@ PLUGIN_NAME = "by_ray"
 class ByRay(mi.BSDF):
     """Asks the BSDF of a ray's kind."""
 
-    tells_rays = True
+    tells_rays = True  # for `ray_kinds.is_by_ray`, which needs no variant
 
     def __init__(self, props: mi.Properties) -> None:
         mi.BSDF.__init__(self, props)
         self._looks = {number: props[name] for number, name in enumerate(RAYS) if name in props}
-        components = [self._looks[n].flags(k) for n in self._looks for k in range(self._looks[n].component_count())]
-        self.m_components = components
-        self.m_flags = 0
-        for flags in components:
-            self.m_flags |= flags
+        looks = self._looks.values()
+        self.m_components = [look.flags(k) for look in looks for k in range(look.component_count())]
+        self.m_flags = reduce(or_, self.m_components)
 
     @property
     def absorbing(self) -> Any:
@@ -47,17 +47,11 @@ class ByRay(mi.BSDF):
 
     def eval(self, ctx: mi.BSDFContext, si: mi.SurfaceInteraction3f, wo: mi.Vector3f, active: Any = True) -> Any:
         """f_r |cos|, RGB."""
-        value = mi.Color3f(0)
-        for look, here in self._of(si, active):
-            value = dr.select(here, mi.Color3f(look.eval(ctx, si, wo, here)), value)
-        return value
+        return self.eval_pdf(ctx, si, wo, active)[0]
 
     def pdf(self, ctx: mi.BSDFContext, si: mi.SurfaceInteraction3f, wo: mi.Vector3f, active: Any = True) -> Any:
         """Density of `sample` per solid angle."""
-        density = mi.Float(0)
-        for look, here in self._of(si, active):
-            density = dr.select(here, look.pdf(ctx, si, wo, here), density)
-        return density
+        return self.eval_pdf(ctx, si, wo, active)[1]
 
     def eval_pdf(
         self, ctx: mi.BSDFContext, si: mi.SurfaceInteraction3f, wo: mi.Vector3f, active: Any = True

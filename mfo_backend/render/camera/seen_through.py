@@ -25,7 +25,7 @@ from .sensor_rays import sensor_ray
 
 MASK_RAYS = 4  # rays per pixel and axis that look for the target
 PLASTIC = (0.7548776662466927, 0.5698402909980532)  # steps of the R2 sequence (Roberts 2018): even over a lens
-MOST_SURFACES = 16  # that a ray goes through: two walls of a glass case are eight. No measurement
+MOST_SURFACES = 16  # that a ray goes through: a bottle in a case of panes is eight. No measurement
 CLEAR = mi.BSDFFlags.Null | mi.BSDFFlags.GlossyTransmission | mi.BSDFFlags.DeltaTransmission
 
 

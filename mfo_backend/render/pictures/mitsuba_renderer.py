@@ -7,6 +7,7 @@ import contextlib
 import gc
 import itertools
 from collections.abc import Callable, Iterator, Mapping, Sequence
+from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 from xml.etree import ElementTree
@@ -68,7 +69,6 @@ class MitsubaRenderer:
         if graph is not None:
             textures = {name: self._texture(name) for name in graph.varying}
             graph.note(graph.table.pack({}), {k: Shown(t.picture, t.elsewhere, t.outside) for k, t in textures.items()})
-        self._mask: NDArray[np.bool_] | None = None
         self._of_pixels: PixelPictures | None = None
 
     @property
@@ -168,17 +168,18 @@ class MitsubaRenderer:
 
     def target_mask(self) -> NDArray[np.bool_]:
         """See `Renderer.target_mask`: a regular grid of rays in every pixel, without the pixel filter's tails."""
-        from ..camera.seen_through import seen_pixels  # can be imported when a variant is set
-
-        if self._mask is None:
-            self._mask, self._is_behind = seen_pixels(self._scene, self._sensor, self.shape)
-        return self._mask.copy()
+        return self._seen[0].copy()
 
     @property
     def is_behind_glass(self) -> bool:
         """Whether the camera sees the target through others alone; the mask is then where it does."""
-        self.target_mask()
-        return self._is_behind
+        return self._seen[1]
+
+    @cached_property
+    def _seen(self) -> tuple[NDArray[np.bool_], bool]:
+        from ..camera.seen_through import seen_pixels  # can be imported when a variant is set
+
+        return seen_pixels(self._scene, self._sensor, self.shape)
 
     def _update(self, vector: Vector, *, differentiable: bool) -> Any:
         """Put `vector` into the scene anew: the plugin derives values (IOR from specular) in the update's own graph."""

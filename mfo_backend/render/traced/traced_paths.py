@@ -23,7 +23,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...material.arrays.own_memory import own_memory
-from ...material.plugins.ray_kinds import CAMERA, is_by_ray, kind_of_ray
+from ...material.plugins.ray_kinds import CAMERA, kind_of_ray
 from ...types.errors import UnrecordableError
 from ..camera.primary_rays import camera_ray, through_filter
 from ..lamps.met_lamps import SceneLamps, alone
@@ -69,7 +69,6 @@ class TracedPaths:
         self._light_paths = renderer.light_paths
         self._lamps, self._shadows, self._view = SceneLamps(scene), ShadowRays(scene), CameraView(scene)
         self._terminator, self._absorption = self._shadows.terminator, self._shadows.absorption
-        self._by_ray = is_by_ray(scene)
         self._camera_world = getattr(integrator, "camera_world", None)
         # a mix tells by its other leaves what goes through it; of those this one's alpha is taken as it is
         names = () if target.tree is not None else self.table.names
@@ -165,7 +164,7 @@ class TracedPaths:
             "inside": self._absorption.outside(),
             "active": mi.Bool(True),
         }
-        if self._by_ray:
+        if self._shadows.by_ray:
             state["kind"] = mi.Float(CAMERA)
         if self._light_paths is not None:
             # the least density so far, and bounces of each kind
@@ -188,7 +187,7 @@ class TracedPaths:
             blur = self._blur(s)
             if blur is not None:
                 si.duv_dx = mi.Point2f(blur, 0.0)
-            of_ray = s.get("kind", 0.0)
+            of_ray = s.get("kind", CAMERA)
             si.duv_dy = mi.Point2f(0.0, of_ray)
             emitter = si.emitter(scene, active)
             ds = met_light(scene, si, s["before"])
@@ -295,7 +294,7 @@ class TracedPaths:
                 "inside": self._absorption.beyond(s["inside"], si, local, active),
                 "active": active,
             }
-            if self._by_ray:
+            if self._shadows.by_ray:
                 after["kind"] = dr.select(is_bounce, kind_of_ray(kind), s["kind"])
             after |= self._counted(s, kind, pdf_next, after["left"])
             if self._light_paths is not None:

@@ -21,7 +21,7 @@ import mitsuba as mi
 from mitsuba.ad.integrators.common import RBIntegrator  # pyright: ignore[reportMissingImports]
 
 from ...material.plugins.material_kinds import MaterialKinds
-from ...material.plugins.ray_kinds import CAMERA, SCATTERED, is_by_ray, kind_of_ray
+from ...material.plugins.ray_kinds import CAMERA, SCATTERED, kind_of_ray
 from ...types.light_paths import NO_LIMIT, TRANSPARENT_BOUNCES, LightPaths
 from ..lamps.met_lamps import SceneLamps, alone
 from .absorption import Inside
@@ -83,7 +83,7 @@ class CyclesPath(RBIntegrator):
         primal = mode == dr.ADMode.Primal
         lamps, shadows = SceneLamps(scene), ShadowRays(scene)
         terminator, view, absorption = shadows.terminator, CameraView(scene), shadows.absorption
-        context, materials, by_ray = mi.BSDFContext(), MaterialKinds(scene), is_by_ray(scene)
+        context, materials, by_ray = mi.BSDFContext(), MaterialKinds(scene), shadows.by_ray
         ray = mi.Ray3f(dr.detach(ray))
         radiance = mi.Spectrum(0 if primal else state_in)
         change = mi.Spectrum(0 if δL is None else δL)

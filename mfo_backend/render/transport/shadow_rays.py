@@ -57,7 +57,7 @@ class ShadowRays:
         # surfaces that light goes straight through; Mitsuba's integrators block all light
         self.most = int(getattr(scene.integrator(), "transparent_bounces", 0))
         self.lets_through = lets_through(scene, mi.BSDFFlags.Null)
-        self._by_ray = is_by_ray(scene)
+        self.by_ray = is_by_ray(scene)
 
     def passed(
         self,
@@ -126,7 +126,7 @@ class ShadowRays:
             segment = dr.select(active, dr.select(si.is_valid(), si.t, ray.maxt), 0)
             lengths = absorption.further(lengths, inside, segment)
             active &= si.is_valid()
-            if self._by_ray:
+            if self.by_ray:
                 si.duv_dy = mi.Point2f(0, SHADOW)
             bsdf = si.bsdf()
             share = mi.Color3f(bsdf.eval_null_transmission(si, active))

@@ -18,44 +18,6 @@ PATHS = {name: ["Principled BSDF", name] for name in ("Base Color", "Roughness",
 COLOURED = ("Base Color", "Roughness", "Coat Roughness")  # what the graph is linked to
 
 
-@pytest.fixture
-def graph(scene: SimpleNamespace) -> SimpleNamespace:
-    """Noise through a ramp of three stops, mixed with a colour by a group that another material has, too; the ramp is
-    the roughness as well, and another ramp is nothing but the roughness of the coat."""
-    bpy = scene.bpy
-    material = bpy.data.materials["Glaze"]
-    if material.node_tree is None:
-        material.use_nodes = True
-    tree: Any = material.node_tree
-    shader = tree.nodes["Principled BSDF"]
-    group: Any = bpy.data.node_groups.new("Wash", "ShaderNodeTree")
-    group.interface.new_socket("Under", in_out="INPUT", socket_type="NodeSocketColor")
-    group.interface.new_socket("Paint", in_out="INPUT", socket_type="NodeSocketColor")
-    group.interface.new_socket("Color", in_out="OUTPUT", socket_type="NodeSocketColor")
-    mix, entry = group.nodes.new("ShaderNodeMix"), group.nodes.new("NodeGroupInput")
-    mix.data_type = "RGBA"
-    group.links.new(entry.outputs["Under"], mix.inputs["A"] if mix.inputs["A"].type == "RGBA" else mix.inputs[6])
-    group.links.new(entry.outputs["Paint"], mix.inputs[7])
-    group.links.new(mix.outputs[2], group.nodes.new("NodeGroupOutput").inputs[0])
-    noise, ramp, coat = (tree.nodes.new(f"ShaderNode{kind}") for kind in ("TexNoise", "ValToRGB", "ValToRGB"))
-    ramp.color_ramp.elements.new(0.25).color = (0.2, 0.4, 0.6, 0.5)
-    node = tree.nodes.new("ShaderNodeGroup")
-    node.node_tree, node.label = group, "Wash, thin"
-    tree.links.new(noise.outputs[0], ramp.inputs[0])
-    tree.links.new(noise.outputs[0], coat.inputs[0])
-    tree.links.new(ramp.outputs["Color"], node.inputs["Under"])
-    tree.links.new(ramp.outputs["Color"], shader.inputs["Roughness"])
-    tree.links.new(coat.outputs["Color"], shader.inputs["Coat Roughness"])
-    tree.links.new(node.outputs[0], shader.inputs["Base Color"])
-    other = bpy.data.materials.new("Other")
-    if other.node_tree is None:
-        other.use_nodes = True
-    bpy.data.materials["Other"].node_tree.nodes.new("ShaderNodeGroup").node_tree = group
-    return SimpleNamespace(
-        bpy=bpy, material=material, ramp=ramp, coat=coat, noise=noise, node=node, group=group, shader=shader
-    )
-
-
 def values_of(material: Any) -> dict[str, Any]:
     from blender_addon.export.nodes.target_shader import target_shader
     from blender_addon.graph_values.table import graph_values
@@ -339,52 +301,6 @@ def test_values_inside_nodes_of_what_lets_light_through_stay(graph: SimpleNamesp
     report = export_job(graph.bpy.context, target, tmp_path / "job", reference=None, fit={})
     said = f"stay as they are: a fit of them needs an opaque material, and '{kind} BSDF' lets light through."
     assert any(note.endswith(said) for note in report.notes)
-
-
-def test_a_picture_is_tinted_by_a_node_that_apply_puts_there(graph: SimpleNamespace, tmp_path: Path) -> None:
-    from blender_addon.graph_values.place import read
-    from blender_addon.probe.value_pictures import answer
-    from blender_addon.result.write_back import apply_values, revert_values, toggle_values
-
-    bpy = graph.bpy
-    scene, tree = bpy.context.scene, graph.material.node_tree
-    image = bpy.data.images.new("Picture", 4, 4)
-    image.generated_color = (0.5, 0.25, 0.125, 1.0)
-    image.colorspace_settings.name = "Non-Color"
-    texture = tree.nodes.new("ShaderNodeTexImage")
-    texture.image = image
-    for name in ("Base Color", "Roughness"):
-        tree.links.new(texture.outputs["Color"], graph.shader.inputs[name])
-    values = values_of(graph.material)
-    names = ("Base Color/Gain", "Base Color/Offset", "Roughness/Gain")
-    assert [(values[n].place.size, values[n].range.lower, values[n].range.upper) for n in names] == [
-        (3, 0.0, 4.0), (3, -0.5, 0.5), (1, 0.0, 4.0)
-    ]  # fmt: skip
-    assert [read(tree, values[n].place) for n in names] == [(1.0, 1.0, 1.0), (0.0, 0.0, 0.0), 1.0]
-    before = len(tree.nodes)
-    variants = [{"values": [(2.0, 1.0, 1.0), (0.0, 0.25, 0.0), 0.5], "sockets": ["Base Color", "Roughness"]}]
-    found = answer({
-        "scene": scene.name, "layer": bpy.context.view_layer.name, "object": "Väse", "slot": 0,
-        "sockets": PATHS, "places": [values[n].place.request() for n in names], "variants": variants,
-        "scale": 1, "samples": 1, "folder": str(tmp_path),
-    })  # fmt: skip
-    seen = np.isfinite(np.load(tmp_path / found["positions"])).all(axis=2)
-    color, rough = (np.load(tmp_path / found["files"][0][name])[seen] for name in ("Base Color", "Roughness"))
-    np.testing.assert_allclose(color, np.broadcast_to((1.0, 0.5, 0.125), color.shape), atol=5e-3)
-    grey = 0.2126 * 0.5 + 0.7152 * 0.25 + 0.0722 * 0.125
-    np.testing.assert_allclose(rough, 0.5 * grey, atol=2e-3)
-    assert len(tree.nodes) == before  # a look has put nothing there
-    assert apply_values(graph.material, {names[0]: (2.0, 1.0, 0.5), names[2]: 0.5}, JOB) == []
-    assert len(tree.nodes) == before + 2
-    tint = graph.shader.inputs["Base Color"].links[0].from_node
-    assert (tint.label, tuple(tint.inputs[1].default_value)) == ("Tint Base Color", (2.0, 1.0, 0.5))
-    assert tint.inputs[0].links[0].from_node == texture
-    assert {name for name in values_of(graph.material) if name.startswith(("Base Color", "Tint"))} == {*names[:2]}
-    toggle_values(graph.material)
-    assert tuple(tint.inputs[1].default_value) == (1.0, 1.0, 1.0)
-    toggle_values(graph.material)
-    assert revert_values(graph.material) == []
-    assert tuple(tint.inputs[1].default_value) == (1.0, 1.0, 1.0)
 
 
 def test_a_long_graph_is_walked_once(graph: SimpleNamespace, monkeypatch: pytest.MonkeyPatch) -> None:

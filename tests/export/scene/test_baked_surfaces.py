@@ -339,7 +339,7 @@ def test_what_one_output_gives_is_baked_once_and_of_what_shines_the_light_alone(
     nodes.tree.links.new(added.outputs[0], nodes.surface)
     depsgraph = bpy.context.evaluated_depsgraph_get()
     instance = SimpleNamespace(object=ball.evaluated_get(depsgraph), matrix_world=ball.matrix_world, is_instance=False)
-    (leaf,) = surface.baked_surface(bpy.context.scene, instance, depsgraph, 0, tmp_path, 64)["leaves"]
+    (leaf,) = surface.baked_surface(bpy.context.scene, instance, depsgraph, 0, tmp_path, 64, "scattered")["leaves"]
     assert len(baked) == 4
     sockets = leaf["sockets"]
     assert sockets["Base Color"] == sockets["Specular Tint"] == sockets["Sheen Tint"] != sockets["Roughness"]

@@ -124,6 +124,17 @@ def test_a_wall_that_some_rays_pass(
         assert np.abs(level).max() < 0.003, name
 
 
+def test_subsurface_that_some_rays_pass_is_said_to_be_diffuse(scene: Any, export: Any) -> None:
+    lit_scene(scene)
+    target = ball(new_material("Target"))
+    wax = add_quad("Wax", 3.0, -1.2, new_material("Wax", Subsurface_Weight=1.0))
+    for is_seen, count in ((True, 0), (False, 1)):
+        wax.visible_glossy = is_seen
+        bpy.context.view_layer.objects.active = target
+        said = [n for n in export(target, name=f"{is_seen}").notes if "its Subsurface is shown as diffuse" in n]
+        assert len(said) == count
+
+
 def material_by_rays(shader: str, *rays: str) -> Any:
     """One that is clear to these rays and another shader to all others, as windows have it."""
     material = new_material("By Ray")

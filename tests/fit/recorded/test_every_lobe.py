@@ -95,8 +95,11 @@ def test_values_of_a_material_with_holes_are_recovered(even, tmp_path):
         write_exr(tmp_path / "alpha.exr", np.repeat(cells, 3, axis=2).astype(np.float32))
         alpha["texture"] = str(tmp_path / "alpha.exr")
     renderer = glass.load(tmp_path, list(SEEN), {"Alpha": alpha}, size=40)
-    x = renderer.table.pack(SEEN)
-    result, _ = glass.fit(renderer, renderer.image(x, seed=5, spp=64))
-    assert [stage.name for stage in result.stages] == ["scan", "start", "refine"]
-    # at 64 samples a pixel; of 16 such pictures under even alpha the metallic was 0.13 off in the worst
-    np.testing.assert_allclose(renderer.table.pack(result.recovered), x, atol=0.15)
+    x, found = renderer.table.pack(SEEN), []
+    for seed in range(5, 10):
+        result, _ = glass.fit(renderer, renderer.image(x, seed=seed, spp=64))
+        assert [stage.name for stage in result.stages] == ["scan", "start", "refine"]
+        found.append(renderer.table.pack(result.recovered))
+    # by the noise of 64 samples a pixel: of 16 such pictures under even alpha the metallic was 0.13 off in the worst
+    np.testing.assert_allclose(np.median(found, axis=0), x, atol=0.05)
+    np.testing.assert_allclose(found, np.broadcast_to(x, (5, len(x))), atol=0.15)
