@@ -51,7 +51,7 @@ _SOCKETS = (
     *("Coat Tint", "Sheen Weight", "Sheen Roughness", "Sheen Tint", "Subsurface Weight", "Thin Film Thickness"),
     *("Thin Film IOR", "Emission Color"),
     # last: a file keeps what is chosen by its place
-    *("Subsurface Radius", "Subsurface Scale", *_OF_NODES),
+    *("Subsurface Radius", "Subsurface Scale", *_OF_NODES, "Emission Strength"),
 )
 SOCKET_ITEMS = tuple((name.lower().replace(" ", "_"), name, "", 1 << i) for i, name in enumerate(_SOCKETS))
 SOCKETS_START = {"base_color", "roughness", "metallic", "specular_ior_level"}

@@ -175,7 +175,7 @@ def _free_values(scene: bpy.types.Scene, material: bpy.types.Material, said: str
 
 
 def _without_effect(target: TargetShader, chosen: Container[str]) -> list[Finding]:
-    """Chosen details of a lobe that has no weight and gets none."""
+    """Chosen details of a lobe that has no weight and gets none, and a strength that its colour stands for."""
     found = []
     for detail, amount in AMOUNT_OF.items():
         lobe = target.sockets.get(amount)
@@ -185,6 +185,10 @@ def _without_effect(target: TargetShader, chosen: Container[str]) -> list[Findin
             names = target.own_name(detail), target.own_name(amount)
             sentence = "{} has no effect while {} is 0: give that a value, or choose it too.".format(*names)
             found.append(Finding(STOPS, sentence, (Fix("all_parameters"),)))
+    color = target.sockets.get("Emission Color")
+    if "Emission Strength" in chosen and color is not None and source_of(color) is None:
+        sentence = "Emission Strength multiplies Emission Color, which has no link: choose that."
+        found.append(Finding(STOPS, sentence, (Fix("all_parameters"),)))
     return found
 
 

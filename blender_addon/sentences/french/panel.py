@@ -44,6 +44,7 @@ PANEL = {
     "Material '{}' is also on {}: applied values change it there too.": "Le matériau '{}' est aussi sur {} : des valeurs appliquées l'y changent aussi.",
     "No value is chosen that has no link: choose at least one, or All.": "Aucune valeur sans lien n'est choisie : en choisir au moins une, ou Toutes.",
     "{} has no effect while {} is 0: give that a value, or choose it too.": "{} n’a pas d’effet tant que {} vaut 0 : y donner une valeur, ou le choisir aussi.",
+    "Emission Strength multiplies Emission Color, which has no link: choose that.": "Emission Strength multiplie Emission Color, qui n’a pas de lien : choisir celui-ci.",
     "The limits of {} leave nothing: the least must be below the most.": "Les limites de {} ne laissent rien : le minimum doit être sous le maximum.",
     "Fitted inside nodes: {}.": "Ajusté dans les nœuds : {}.",
     "Fitted {}: {}{}.": "Ajusté {} : {}{}.",

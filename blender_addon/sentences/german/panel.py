@@ -44,6 +44,7 @@ PANEL = {
     "Material '{}' is also on {}: applied values change it there too.": "Material '{}' ist auch auf {}: angewendete Werte ändern es dort ebenfalls.",
     "No value is chosen that has no link: choose at least one, or All.": "Kein Wert ohne Verbindung ist ausgewählt: mindestens einen auswählen, oder Alle.",
     "{} has no effect while {} is 0: give that a value, or choose it too.": "{} hat keine Wirkung, solange {} 0 ist: dort einen Wert eingeben, oder es auch wählen.",
+    "Emission Strength multiplies Emission Color, which has no link: choose that.": "Emission Strength vervielfacht Emission Color, das keine Verknüpfung hat: stattdessen dieses wählen.",
     "The limits of {} leave nothing: the least must be below the most.": "Die Grenzen von {} lassen nichts übrig: das Mindeste muss unter dem Höchsten liegen.",
     "Fitted inside nodes: {}.": "In Nodes angepasst: {}.",
     "Fitted {}: {}{}.": "Angepasst {}: {}{}.",

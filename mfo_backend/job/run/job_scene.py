@@ -114,8 +114,9 @@ def held_notes(request: Request, result: FitResult) -> tuple[str, ...]:
     color, strength = (
         material.sockets.get(SOCKET_OF_PARAMETER[name]) for name in ("emission_color", "emission_strength")
     )
-    if color is not None and strength is not None and (color.linked or strength.linked):
-        notes += [_GLOW_HELD] if strength.linked or strength.value != 0.0 else []
+    held = color is not None and strength is not None and "emission_strength" not in result.recovered
+    if held and (color.linked or strength.linked) and (strength.linked or strength.value != 0.0):
+        notes.append(_GLOW_HELD)
     return tuple(notes)
 
 

@@ -90,9 +90,15 @@ _CLASSES = (
 )
 
 
-def _glowing(strength: float) -> MaterialClass:
-    sockets = GLOWING | {"Emission Strength": strength}
-    return MaterialClass("glowing", sockets, ("emission_color",), _OF_GLASS, glows=True)
+def _glowing(material: Mapping[str, Any], glow: float) -> MaterialClass:
+    """Where nodes give the emission's colour, a class of its strength alone, which the mean of the colour begins at."""
+    color = material["sockets"].get("Emission Color", {})
+    if not color.get("linked"):
+        sockets = GLOWING | {"Emission Strength": glow}
+        return MaterialClass("glowing", sockets, ("emission_color",), _OF_GLASS, glows=True)
+    mean = float(np.max(color.get("value") or 0.0))
+    sockets = OPAQUE | {"Emission Strength": glow / mean if mean > 0.0 else 0.0}
+    return MaterialClass("glowing", sockets, ("emission_strength",), _OF_GLASS, glows=True)
 
 
 def brightest_glow(reference: Image, view: View, target: NDArray[np.bool_]) -> float:
@@ -112,7 +118,8 @@ def other_classes(material: Mapping[str, Any], glow: float) -> list[MaterialClas
     if material.get("leaves"):
         return []
     own = _class_of(sockets)
-    classes = sorted((_glowing(glow), *_CLASSES) if glow > 0.0 else _CLASSES, key=lambda other: other.name != own)
+    glowing = (_glowing(material, glow),) if glow > 0.0 else ()
+    classes = sorted((*glowing, *_CLASSES), key=lambda other: other.name != own)
     return [
         other for other in classes
         if (other.name != own or other.also)
@@ -175,7 +182,7 @@ def with_values_of(other: MaterialClass, result: FitResult, material: Mapping[st
         if name not in values and not np.allclose(held, value_of(material, name)):
             values[name] = held
     certainty = dict(result.certainty)
-    if other.glows:
+    if "emission_color" in other.also:
         color, strength = np.asarray(values["emission_color"]), float(other.sockets["Emission Strength"])
         peak = max(float(color.max()), 1e-6)
         values |= {"emission_color": tuple(float(c) for c in color / peak), "emission_strength": strength * peak}

@@ -40,12 +40,13 @@ AMOUNT_OF = {
 }
 # Why what no fit changes is held
 FIXED = {
-    "emission_strength": "it multiplies 'emission_color', fit that",
     "toon_size": "the edge of a cone has no slope",
     "toon_smooth": "the edge of a cone has no slope",
     "subsurface_ior": "it only bends what enters the skin",
     "subsurface_anisotropy": "'subsurface_radius' has nearly the same effect, fit that",
 }
+# Fitted only where nodes give the second, which it multiplies
+TIMES = {"emission_strength": "emission_color"}
 
 
 def select_blender_parameters(
@@ -60,7 +61,7 @@ def select_blender_parameters(
     present
         Names whose weight the material sets to something other than 0.
     linked
-        Names that a texture feeds; they stay fixed.
+        Names that a texture feeds; they stay fixed. Of an emission whose colour is one of them the strength is free.
 
     Raises
     ------
@@ -74,14 +75,17 @@ def select_blender_parameters(
         wanted = list(REDUCED if selection == "reduced" else OPAQUE)
         if selection == "all":
             wanted += [extra for name, extras in _WITH.items() if name in present for extra in extras]
+            wanted += [name for name, other in TIMES.items() if name in present and other in linked]
         return BLENDER_PRINCIPLED.select(name for name in wanted if name not in linked)
     table = BLENDER_PRINCIPLED.select(selection)
     for name in table.names:
         if name in FIXED:
             raise BadInputError(f"Parameter {name!r} cannot be fitted: {FIXED[name]}; choose among {names}.")
+        if name in TIMES and TIMES[name] not in linked:
+            raise BadInputError(f"Parameter {name!r} cannot be fitted: it multiplies {TIMES[name]!r}, fit that.")
         if name in linked:
             raise BadInputError(f"Parameter {name!r} is linked to a texture: unlink it or leave it out.")
         if name in AMOUNT_OF and AMOUNT_OF[name] not in {*present, *linked, *table.names}:
-            cure = "give it a value in the scene" if AMOUNT_OF[name] in FIXED else f"add {AMOUNT_OF[name]!r}"
+            cure = "give it a value in the scene" if AMOUNT_OF[name] in TIMES else f"add {AMOUNT_OF[name]!r}"
             raise BadInputError(f"Parameter {name!r} has no effect while {AMOUNT_OF[name]!r} is 0: {cure}.")
     return table

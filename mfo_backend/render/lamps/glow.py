@@ -23,13 +23,18 @@ from .face_points import FacePoints
 
 
 class Glow(mi.Emitter):
-    """Properties: `radiance`, linear Rec.709, a colour or a texture over the shape it belongs to, and `layered`
-    (false): whether what the shape's BSDF has above takes its part of that, by its `emission_share`, else by alpha."""
+    """Properties: `radiance`, linear Rec.709, a colour or a texture over the shape it belongs to, times `strength` (1).
+
+    `layered` (false) is whether what the shape's BSDF has above takes its part of that, by its `emission_share`, else
+    by alpha. `free` is which of the two a fit changes, if any: "radiance" or "strength".
+    """
 
     def __init__(self, props: mi.Properties) -> None:
         super().__init__(props)
         self.radiance = props.get_emissive_texture("radiance", 1.0)
+        self.strength = dr.opaque(mi.Float, float(props.get("strength", 1.0)))
         self.layered = bool(props.get("layered", False))
+        self.free = str(props.get("free", ""))
         self.m_flags = +mi.EmitterFlags.Surface
         if self.radiance.is_spatially_varying():
             self.m_flags |= +mi.EmitterFlags.SpatiallyVarying
@@ -37,10 +42,15 @@ class Glow(mi.Emitter):
     def traverse(self, callback: Any) -> None:
         """See `mi.Object`."""
         callback.put("radiance", self.radiance, mi.ParamFlags.Differentiable)
+        callback.put("strength", self.strength, mi.ParamFlags.Differentiable)
+
+    def parameters_changed(self, keys: Any = ()) -> None:
+        """Keep the strength what no kernel knows."""
+        dr.make_opaque(self.strength)
 
     def eval(self, si: mi.SurfaceInteraction3f, active: Any = True) -> mi.Color3f:
         """See `mi.Emitter`."""
-        return dr.select(active, self.radiance.eval(si, active) * self.share(si, active), 0.0)
+        return dr.select(active, self.radiance.eval(si, active) * self.strength * self.share(si, active), 0.0)
 
     def share(self, si: mi.SurfaceInteraction3f, active: Any = True, *, sampled: bool = False) -> mi.Color3f:
         """What layers above leave of the radiance towards the view, or towards a point that has `sampled` the light."""
@@ -51,9 +61,10 @@ class Glow(mi.Emitter):
             return bsdf.emission_share(si, active, sampled=sampled)
         return 1.0 - mi.Color3f(bsdf.eval_null_transmission(si, active))
 
-    def unlayered(self, si: mi.SurfaceInteraction3f, unit: float | None, active: Any = True) -> mi.Color3f:
-        """What is sent out below all layers; where the colour is free, `unit` is the radiance of a colour of 1."""
-        return mi.Color3f(self.radiance.eval(si, active) if unit is None else dr.opaque(mi.Float, unit))
+    def unlayered(self, si: mi.SurfaceInteraction3f, active: Any = True) -> mi.Color3f:
+        """What is sent out below all layers, of a free factor of 1."""
+        held = mi.Color3f(1.0) if self.free == "radiance" else mi.Color3f(self.radiance.eval(si, active))
+        return held if self.free == "strength" else held * self.strength
 
     def sample_direction(
         self, it: mi.Interaction3f, sample: mi.Point2f, active: Any = True
@@ -74,7 +85,8 @@ class Glow(mi.Emitter):
         """See `mi.Emitter`."""
         si = mi.SurfaceInteraction3f(ds, it.wavelengths)
         si.wi = si.to_local(-ds.d)
-        return dr.select(active, self.radiance.eval(si, active) * self.share(si, active, sampled=True), 0.0)
+        sent = self.radiance.eval(si, active) * self.strength
+        return dr.select(active, sent * self.share(si, active, sampled=True), 0.0)
 
     @cached_property
     def _points(self) -> FacePoints | None:

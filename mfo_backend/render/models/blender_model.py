@@ -13,7 +13,7 @@ from xml.etree import ElementTree
 import numpy as np
 from numpy.typing import NDArray
 
-from ...material.principled.blender_selection import select_blender_parameters
+from ...material.principled.blender_selection import TIMES, select_blender_parameters
 from ...material.principled.mix_values import mix_values
 from ...material.principled.principled_dict import (
     blender_principled_dict,
@@ -21,19 +21,21 @@ from ...material.principled.principled_dict import (
     is_mixed,
     leaf_radiance_dict,
     socket_value,
+    unit_radiance_dict,
 )
 from ...material.principled.principled_parameters import PARAMETER_OF_SOCKET, SOCKET_OF_PARAMETER
 from ...scene.scene_xml import Element, Target
 from ...types.errors import BadInputError
 from ...types.parameter import ParameterTable, Value
-from .prepared_material import EMISSION, RADIANCE_KEY, Materials, PreparedMaterial
+from .prepared_material import GLOW_KEYS, Materials, PreparedMaterial
 
 # How far light may go below a surface, of a fit: so many times less or more than the least or largest radius of the
 # scene, for walks that were made for that tell of it. From four times too small a red radius was found
 # (docs/notebook/subsurface.md). Larger: not tried
 WALKS_NEAR = 5.0
-# Density of a volume: at most so many times that of the scene, for sizes of a scene differ by any factor
+# Density of a volume and the strength of a glow: at most so many times that of the scene, for both may be any number
 DENSITY = "absorption_density"
+COLOR, STRENGTH = GLOW_KEYS
 WALK_SIZES, LEAST_SIZE = ("subsurface_radius", "subsurface_scale"), 1e-4
 SOCKETS = frozenset(PARAMETER_OF_SOCKET)
 _VERSION = (5, 0)  # of a job that does not say which Blender it comes from
@@ -71,7 +73,7 @@ def prepare_several_blender_principled(
             start = {} if table is None else table.unpack(opened[bsdf_id][2])
             _put_material(scene, bsdf, materials[bsdf_id], start, textures)
     _put_normal_maps(scene, materials)
-    return [_prepared(scene, *found, materials[bsdf_id]) for bsdf_id, found in opened.items()]
+    return [_prepared(scene, *found, materials[bsdf_id], textures) for bsdf_id, found in opened.items()]
 
 
 def _put_normal_maps(scene: Element, materials: Materials) -> None:
@@ -110,7 +112,8 @@ def _opened(target: Target, selection: str | Sequence[str], materials: Materials
         )
     sockets = materials[target.bsdf_id]["sockets"]
     linked = {PARAMETER_OF_SOCKET[name] for name, socket in sockets.items() if socket.get("linked") and name in SOCKETS}
-    present = [name for name, value in _constants(sockets).items() if value != 0.0]
+    held = TIMES if is_mixed(materials[target.bsdf_id]) else ()  # a mix's glow is a picture of all its shaders
+    present = [name for name, value in _constants(sockets).items() if value != 0.0 and name not in held]
     # values inside nodes may be all that is fitted
     nothing = not isinstance(selection, str) and not selection
     chosen = None if nothing else select_blender_parameters(selection, present=present, linked=linked)
@@ -126,6 +129,8 @@ def _near_walks(table: ParameterTable, values: Mapping[str, Value], sizes: Colle
     for p in table:
         if p.name == DENSITY and values.get(DENSITY):
             p = replace(p, upper=float(np.ravel(values[DENSITY])[0]) * WALKS_NEAR)
+        if p.name == STRENGTH:
+            p = replace(p, upper=(float(np.ravel(values.get(STRENGTH, 0.0))[0]) or 1.0) * WALKS_NEAR)
         if p.name in sizes:
             present = np.maximum(np.ravel(values.get(p.name, p.default)), LEAST_SIZE)
             begin = tuple(float(v) for v in present) if p.size == 3 else float(present[0])
@@ -152,7 +157,7 @@ def _put_material(
 ) -> None:
     """Make a BSDF the plugin of a material; what has a `start` is open to change."""
     bsdf_id, version = bsdf.get("id", ""), material.get("blender_version", _VERSION)
-    free = [name for name in start if name != EMISSION]
+    free = [name for name in start if name not in GLOW_KEYS]
     opened = {SOCKET_OF_PARAMETER[name]: {"value": value} for name, value in start.items()}
     properties = blender_principled_dict(
         dict(material["sockets"]) | (opened if free else {}),
@@ -167,43 +172,61 @@ def _put_material(
     _rewrite(bsdf, properties, textures)
     bsdf.set("id", bsdf_id)
     radiance = leaf_radiance_dict(material, material.get("film_exposure", 1.0))
-    if radiance is not None and free and EMISSION in start:
+    if radiance is not None and (COLOR in start or (STRENGTH in start and is_mixed(material))):
         raise BadInputError(
-            "The emission of a mix, and one that nodes give, is held: leave emission_color out of the parameters."
+            "The emission of a mix is held, and the colour of one that nodes give: leave them out of the parameters."
         )
     if radiance is not None:
         _replace_radiance(scene, bsdf_id, radiance, textures)
 
 
 def _prepared(
-    scene: Element, target: Target, table: ParameterTable, start: NDArray[np.float64], material: Mapping[str, Any]
+    scene: Element,
+    target: Target,
+    table: ParameterTable,
+    start: NDArray[np.float64],
+    material: Mapping[str, Any],
+    textures: Mapping[str, Element],
 ) -> PreparedMaterial:
     """What the renderer is told of a target whose BSDF has been put."""
     outer, mix = target.outer, mix_values(material)
     of_fitted = "fitted." if is_mixed(material) else ""
-    key_ends, factors = {name: f"{of_fitted}{name}" for name in table.names}, {}
-    if EMISSION in table.names:
-        strength = float(np.ravel(_constants(material["sockets"])["emission_strength"])[0])
-        factors[EMISSION] = strength * material.get("film_exposure", 1.0)
-        key_ends[EMISSION] = RADIANCE_KEY
-        _open_emission(scene, target.shape_id, factors[EMISSION] * start[table.slice_of(EMISSION)])
+    key_ends = {name: GLOW_KEYS.get(name, f"{of_fitted}{name}") for name in table.names}
+    if COLOR in table.names or STRENGTH in table.names:
+        _open_emission(scene, target.shape_id, table.unpack(start), material, textures)
     if mix is not None:
         sizes = [shown for names in mix.leaves.values() for name, shown in names.items() if name in WALK_SIZES]
         others = _near_walks(ParameterTable(mix.parameters), mix.start, sizes)
         start = np.concatenate([start, others.clip(others.pack(mix.start))])
         table, key_ends = ParameterTable([*table, *others]), key_ends | mix.key_ends
     outer_target = Target(target.shape_id, target.bsdf_id, outer, outer)
-    return PreparedMaterial(table, start, outer_target, key_ends, factors, mix)
+    return PreparedMaterial(table, start, outer_target, key_ends, mix)
 
 
-def _open_emission(scene: Element, shape_id: str, radiance: NDArray[np.float64]) -> None:
-    """Let the shape glow with this radiance and no other."""
+def _open_emission(
+    scene: Element,
+    shape_id: str,
+    start: Mapping[str, Value],
+    material: Mapping[str, Any],
+    textures: Mapping[str, Element],
+) -> None:
+    """Let the shape glow with the material's emission, whose colour or strength begins at `start`, and no other."""
     shape = next(shape for shape in scene.iter("shape") if shape.get("id") == shape_id)
     for emitter in shape.findall("emitter"):
         shape.remove(emitter)
     emitter = ElementTree.SubElement(shape, "emitter", type="blender_glow")
-    ElementTree.SubElement(emitter, "rgb", name="radiance", value=", ".join(repr(float(v)) for v in radiance))
+    exposure = material.get("film_exposure", 1.0)
+    if COLOR in start:
+        color = ", ".join(repr(float(v)) for v in np.ravel(start[COLOR]))
+        ElementTree.SubElement(emitter, "rgb", name="radiance", value=color)
+        strength = exposure * float(np.ravel(_constants(material["sockets"])[STRENGTH])[0])
+    else:
+        texture = ElementTree.SubElement(emitter, "texture", name="radiance")
+        _rewrite(texture, unit_radiance_dict(material, exposure), textures)
+        strength = float(np.ravel(start[STRENGTH])[0])
+    ElementTree.SubElement(emitter, "float", name="strength", value=repr(strength))
     ElementTree.SubElement(emitter, "boolean", name="layered", value="true")
+    ElementTree.SubElement(emitter, "string", name="free", value="radiance" if COLOR in start else "strength")
 
 
 def _replace_radiance(

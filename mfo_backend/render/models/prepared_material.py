@@ -4,7 +4,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -15,8 +15,8 @@ from ...scene.scene_xml import Target
 from ...types.parameter import ParameterTable
 
 Materials = Mapping[str, Mapping[str, Any]]  # `materials` of request.json
-EMISSION = "emission_color"  # the one parameter that belongs to an emitter beside the BSDF
-RADIANCE_KEY = "emitter.radiance.value"  # of a glow, below its shape
+# The parameters that belong to an emitter beside the BSDF, and how their keys end below its shape
+GLOW_KEYS = {"emission_color": "emitter.radiance.value", "emission_strength": "emitter.strength"}
 
 
 @dataclass(frozen=True)
@@ -24,13 +24,11 @@ class PreparedMaterial:
     """A scene whose target material can be differentiated.
 
     `key_ends` names, for each parameter, how its key ends in `mi.traverse`; the key begins with the target's BSDF id,
-    that of an emitter with its shape's. What the scene has there is the parameter times its factor in `factors`, 1 for
-    most. Of a mix of shaders `mix` says what is free beside the fitted one.
+    that of an emitter with its shape's. Of a mix of shaders `mix` says what is free beside the fitted one.
     """
 
     table: ParameterTable
     start: NDArray[np.float64]
     target: Target
     key_ends: Mapping[str, str]
-    factors: Mapping[str, float] = field(default_factory=dict)
     mix: MixValues | None = None

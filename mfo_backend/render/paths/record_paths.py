@@ -100,7 +100,7 @@ def record_paths(
         if settings.cut_out and settings.mixed:  # its shaders have their shares, holes included
             share = share / dr.maximum(1.0 - dr.mean(shape.bsdf().eval_null_transmission(si)), 1e-6)
         glow = si.emitter(scene).eval(si) * share if shape.is_emitter() and not settings.glows else None
-        radiance = shape.emitter().unlayered(si, settings.unit_emission) * filter_weight if settings.glows else None
+        radiance = shape.emitter().unlayered(si) * filter_weight if settings.glows else None
         if lamps.seen:
             before = lamps.met(ray, si, mi.Bool(True), camera=True) * filter_weight
             glow = before if glow is None else glow + before

@@ -32,8 +32,7 @@ class RecordSettings:
     where lights of no extent are mirrored. Every camera ray meets the lights with extent in as many independent
     `samples`, or in samples of the same directions if they are `alike`. The first `direct_samples` leave light over
     other surfaces out and need no other kernels than a recording with it. With `glows` the target's own light is no
-    part of the constant picture but a lane without direction for each camera ray. Where the emission is free, a colour
-    of 1 has the radiance `unit_emission`.
+    part of the constant picture but a lane without direction for each camera ray.
     Light below the surface is recorded for the extinctions that the material has times those of `walks`, if there are
     any: a walk is a lane without direction, too, and every lane has the numbers of `random_walk.WALK`.
     """
@@ -57,6 +56,5 @@ class RecordSettings:
     alike: bool = False
     direct_samples: int = 0
     glows: bool = False
-    unit_emission: float | None = None
     walks: tuple[float, ...] = ()
     sensor: Any = None  # a camera that the scene lacks

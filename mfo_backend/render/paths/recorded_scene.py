@@ -25,7 +25,6 @@ from ..camera.widened_mask import widened
 from ..lamps.met_lamps import lights_have_no_extent
 from ..machine.memory import require_memory
 from ..models.joined_graph import Graph
-from ..models.prepared_material import EMISSION
 from ..models.scene_values import values_in_scene
 from ..pictures.mitsuba_renderer import MitsubaRenderer
 from ..pictures.pass_counter import with_derivatives
@@ -208,7 +207,6 @@ class RecordedScene:
             highlights=None if self._walks else highlights,
             samples=samples,
             glows=self._glows,
-            unit_emission=self.renderer.factors.get(EMISSION),
         )
         self.renderer.counter.add(1.0)
         return record_paths(self.renderer.scene, self.renderer.shape, settings)
@@ -247,7 +245,6 @@ class RecordedScene:
             light_paths=self.renderer.light_paths,
             samples=2 if self.needs.sampled else 1,
             glows=self._glows,
-            unit_emission=self.renderer.factors.get(EMISSION),
             pixels=pixels,
             sensor=sensor,
         )

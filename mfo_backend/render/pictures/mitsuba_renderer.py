@@ -27,7 +27,7 @@ from ..models.finer_pictures import Shown
 from ..models.graph_pictures import GraphPictures
 from ..models.leaning_normals import tell_own_normals
 from ..models.material_model import material_model
-from ..models.prepared_material import RADIANCE_KEY, Materials, PreparedMaterial
+from ..models.prepared_material import GLOW_KEYS, Materials, PreparedMaterial
 from .pass_counter import PassCounter
 
 if TYPE_CHECKING:  # the module needs Mitsuba's variant to be set
@@ -64,7 +64,6 @@ class MitsubaRenderer:
         self._sensor = scene.sensors()[0]
         self._params = mi.traverse(scene)
         self._keys = _keys_of(list(self._params.keys()), material)
-        self.factors = material.factors
         self._params.keep(list(self._keys.values()))
         if graph is not None:
             textures = {name: self._texture(name) for name in graph.varying}
@@ -193,9 +192,7 @@ class MitsubaRenderer:
             dr.enable_grad(theta)
         for name, key in self._keys.items():
             entries = range(*self.table.slice_of(name).indices(self.table.length))
-            factor = self.factors.get(name, 1.0)
             values = [dr.gather(mi.Float, theta, mi.UInt32(i)) for i in entries]
-            values = values if factor == 1.0 else [value * dr.opaque(mi.Float, factor) for value in values]
             self._params[key] = mi.Color3f(*values) if len(values) == 3 else values[0]
         self._params.update()
         if self.graph is not None:
@@ -354,7 +351,7 @@ def _keys_of(available: Sequence[str], material: PreparedMaterial) -> Mapping[st
     """The `mi.traverse` key of every parameter; wrappers such as `twosided` add a part in the middle."""
     keys = {}
     for name, end in material.key_ends.items():
-        owner = material.target.shape_id if end == RADIANCE_KEY else material.target.bsdf_id
+        owner = material.target.shape_id if end in GLOW_KEYS.values() else material.target.bsdf_id
         found = [key for key in available if key.startswith(f"{owner}.") and key.endswith(f".{end}")]
         if len(found) != 1:
             raise BadInputError(f"Material {material.target.bsdf_id!r} has {len(found)} parameters {end!r}, not one.")

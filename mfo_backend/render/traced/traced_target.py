@@ -20,7 +20,6 @@ from ...material.plugins.principled_plugin import BlenderPrincipled
 from ...material.principled.blender_principled import evaluate
 from ...material.principled.lobe_sampling import NAMES, is_diffuse, lobe_choice, pdf, sample
 from ...types.errors import UnrecordableError
-from ..models.prepared_material import EMISSION
 from ..pictures.mitsuba_renderer import MitsubaRenderer
 from ..transport.absorption import COLOR, DENSITY, coefficient
 from .tangents import Tangents
@@ -64,7 +63,6 @@ class TracedTarget:
         if renderer.mix is not None:
             raise UnrecordableError("Several shaders of a mix, or its factors, are fitted on opaque surfaces alone.")
         self.bsdf, self.table, self.tangents = bsdf, renderer.table, Tangents.of(renderer.table)
-        self.unit_emission = renderer.factors.get(EMISSION)
         emitter = renderer.shape.emitter() if renderer.shape.is_emitter() and self.tree is None else None
         self.glow: Any = emitter if getattr(emitter, "layered", False) else None
 
@@ -90,7 +88,7 @@ class TracedTarget:
             dr.enable_grad(*entries)
         parameters: dict[str, Any] = {}
         if self.glow is not None:
-            parameters |= {EMISSION: mi.Color3f(1.0), "emission_strength": mi.Float(1.0)}
+            parameters |= {"emission_color": mi.Color3f(1.0), "emission_strength": mi.Float(1.0)}
         iterator = iter(entries)
         for p in self.table:
             parameters[p.name] = next(iterator) if p.size == 1 else mi.Color3f(*(next(iterator) for _ in range(3)))
@@ -136,7 +134,7 @@ class TracedTarget:
         pdf_next = dr.select(valid & on, pdf_next, 0.0)
         results = [f_light, f_next]
         if self.glow is not None:
-            results.append(self.glow.unlayered(si, self.unit_emission, met) * mi.Color3f(layers.emission))
+            results.append(self.glow.unlayered(si, met) * mi.Color3f(layers.emission))
         columns = [[dr.detach(result)] for result in results]
         for entry in self.tangents.entries[:directions]:
             for k in entry:

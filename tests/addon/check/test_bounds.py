@@ -71,6 +71,23 @@ def test_details_of_a_lobe_without_weight_are_named_before_the_fit(scene: Simple
     assert stops() == []
 
 
+def test_a_strength_is_fitted_where_its_colour_has_a_link(scene: SimpleNamespace) -> None:
+    from blender_addon.check.checks import quick_check
+
+    settings, material = scene.bpy.context.scene.mfo, scene.bpy.context.object.active_material
+    settings.reference_path, settings.parameter_set = scene.reference, "chosen"
+    settings.sockets = {"roughness", "emission_strength"}
+
+    def said() -> list[str]:
+        found = quick_check(scene.bpy.context.scene, scene.bpy.context.view_layer)
+        return [f.sentence for f in found if f.sentence.startswith("Emission Strength")]
+
+    assert said() == ["Emission Strength multiplies Emission Color, which has no link: choose that."]
+    nodes, links = material.node_tree.nodes, material.node_tree.links
+    links.new(nodes.new("ShaderNodeRGB").outputs[0], nodes["Principled BSDF"].inputs["Emission Color"])
+    assert said() == []
+
+
 def test_which_details_belong_to_a_lobe_is_as_the_backend_has_it() -> None:
     from blender_addon.check.checks import AMOUNT_OF
 

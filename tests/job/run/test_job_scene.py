@@ -80,8 +80,10 @@ def test_a_glow_that_nodes_give_is_said_to_be_held(
         materials={"target_bsdf": SimpleNamespace(sockets=sockets, leaves=())},
         target=SimpleNamespace(bsdf_id="target_bsdf"),
     )
-    result: Any = SimpleNamespace(judgement=SimpleNamespace(verdict=verdict))
+    result: Any = SimpleNamespace(judgement=SimpleNamespace(verdict=verdict), recovered={})
     assert len(held_notes(request, result)) == said
+    result.recovered = {"emission_strength": 2.0}
+    assert held_notes(request, result) == ()
 
 
 def test_other_shaders_of_a_mix_that_kept_their_values_are_named() -> None:
@@ -93,7 +95,8 @@ def test_other_shaders_of_a_mix_that_kept_their_values_are_named() -> None:
         materials={"target_bsdf": SimpleNamespace(sockets={}, leaves=leaves)},
         target=SimpleNamespace(bsdf_id="target_bsdf"),
     )
-    different, same = (SimpleNamespace(judgement=SimpleNamespace(verdict=v)) for v in (Verdict.DIFFERENT, Verdict.SAME))
+    judged = (SimpleNamespace(verdict=verdict) for verdict in (Verdict.DIFFERENT, Verdict.SAME))
+    different, same = (SimpleNamespace(judgement=each, recovered={}) for each in judged)
     (said,) = held_notes(request, different)  # type: ignore[arg-type]
     assert "(Silk)" in said
     assert held_notes(request, same) == ()  # type: ignore[arg-type]

@@ -144,6 +144,19 @@ def test_a_glow_is_written_as_a_full_colour_and_a_strength():
     assert set(found.bounds) == set(found.recovered)
 
 
+def test_of_a_glow_whose_colour_nodes_give_the_strength_is_sought():
+    own = material(Emission_Color=[0.1, 0.5, 0.25])
+    own["sockets"]["Emission Color"]["linked"] = True
+    glowing = other_classes(own, 4.0)[0]
+    assert glowing.sockets["Emission Strength"] == 8.0  # the mean colour is as bright as the class is
+    assert "Emission Color" not in glowing.sockets
+    assert parameters_of(glowing, ("base_color",)) == ["base_color", "emission_strength"]
+    fit = replace(fitted(0.02).result, recovered={"emission_strength": 3.0}, certainty={})
+    assert with_values_of(glowing, fit, own).recovered == {"emission_strength": 3.0}
+    own["sockets"]["Emission Strength"] = {"value": 1.0, "linked": True}
+    assert "glowing" not in [other.name for other in other_classes(own, 4.0)]
+
+
 @pytest.mark.parametrize(("verdict", "level"), [(Verdict.CLOSE, Level.WEAK), (Verdict.DIFFERENT, Level.DETERMINED)])
 def test_a_class_that_takes_the_place_of_a_close_one_is_unsure_of_what_it_has_changed(verdict, level):
     """A rough glass of a third stood for a cloth that was close: two values were determined and wrong."""

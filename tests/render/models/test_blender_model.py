@@ -6,6 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from mfo_backend.material.principled.blender_selection import select_blender_parameters
 from mfo_backend.render.pictures.renderer import Renderer, load_renderer
 from mfo_backend.types.errors import BadInputError
 
@@ -65,6 +66,16 @@ def test_the_whole_set_leaves_out_linked_and_invisible_parameters(tmp_path: Path
     assert {"base_color", "roughness", "coat_weight", "sheen_weight", "specular_ior_level"} <= set(names)
     assert not {"metallic", "alpha", "ior", "transmission_weight", "emission_strength"} & set(names)
     assert load(tmp_path, "reduced").table.names == ("base_color", "roughness", "specular_ior_level")
+
+
+def test_strength_is_free_where_nodes_give_the_colour_of_the_emission() -> None:
+    glowing, linked = ("emission_strength", "roughness"), ("emission_color",)
+    assert "emission_strength" in select_blender_parameters("all", present=glowing, linked=linked).names
+    assert "emission_strength" not in select_blender_parameters("all", present=glowing).names
+    assert "emission_strength" not in select_blender_parameters("all", linked=linked).names  # another class's to try
+    assert select_blender_parameters(("emission_strength",), linked=linked).names == ("emission_strength",)
+    with pytest.raises(BadInputError, match="give it a value in the scene"):
+        select_blender_parameters(("emission_color",))
 
 
 @pytest.mark.parametrize(

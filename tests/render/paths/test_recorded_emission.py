@@ -103,3 +103,35 @@ def test_free_emission_is_linear_in_picture_and_derivatives(tmp_path):
     assert got[:, 2, 0].min() > 0.6 * 0.8 * 1.5 - 0.02
     np.testing.assert_allclose(got[:, :, -3:], 1.2 * np.broadcast_to(np.eye(3), (len(got), 3, 3)), atol=1e-4)
     np.testing.assert_allclose(scene.pictures(paths, groups)(x)[:, :, 0], got[:, :, 0], rtol=1e-4)
+
+
+def test_a_free_strength_scales_what_a_texture_gives(tmp_path):
+    """Oracle: Mitsuba's own area light of the same picture."""
+    import mitsuba as mi
+
+    colors = np.random.default_rng(4).random((4, 4, 3)).astype(np.float32)
+    mi.Bitmap(colors).write(str(tmp_path / "glow.exr"))
+    sockets = {
+        "Base Color": {"value": [0.0, 0.0, 0.0], "linked": False},
+        "Emission Color": {"value": [0.5, 0.5, 0.5], "linked": True, "texture": str(tmp_path / "glow.exr")},
+        "Emission Strength": {"value": 0.8, "linked": False},
+    }
+    materials = {"target_bsdf": {"name": "Lamp", "distribution": "MULTI_GGX", "sockets": sockets, "film_exposure": 1.5}}
+    path = write_scene(tmp_path, POINT, shape=GLOW)
+    path.write_text(path.read_text("utf-8").replace('type="sphere"', 'type="cube"'), "utf-8")
+    names = ["specular_ior_level", "emission_strength"]
+    renderer = load_renderer(path, "target", model="blender_principled", parameters=names, materials=materials)
+    from mfo_backend.render.paths.recorded_scene import RecordedScene
+
+    assert (renderer.table["emission_strength"].upper, renderer.start[-1]) == (4.0, 0.8)
+    scene = RecordedScene(renderer, int(renderer.target_mask().sum()))
+    x = renderer.table.pack({"specular_ior_level": 0.0, "emission_strength": 2.0})
+    paths = scene.record(renderer.start, grid=10, seed=3, near=False)
+    groups = paths.tile_groups(paths.interior)
+    got = scene.evaluator(paths, groups)(x)
+    textured = f'<texture type="bitmap" name="radiance"><string name="filename" value="{tmp_path / "glow.exr"}"/>'
+    textured += '<boolean name="raw" value="true"/></texture></emitter>'
+    text = path.read_text("utf-8").replace(GLOW, f'<emitter type="area">{textured}').replace(POINT, "")
+    expected = groups.average(1.5 * np.array(mi.render(mi.load_string(text), spp=256)))
+    np.testing.assert_allclose(got[:, :, -1], expected, rtol=0.03, atol=0.005)
+    np.testing.assert_allclose(got[:, :, 0], groups.average(renderer.image(x, seed=7, spp=256)), rtol=0.02, atol=0.002)
