@@ -114,9 +114,9 @@ def held_notes(request: Request, result: FitResult) -> tuple[str, ...]:
     color, strength = (
         material.sockets.get(SOCKET_OF_PARAMETER[name]) for name in ("emission_color", "emission_strength")
     )
-    held = color is not None and strength is not None and "emission_strength" not in result.recovered
-    if held and (color.linked or strength.linked) and (strength.linked or strength.value != 0.0):
-        notes.append(_GLOW_HELD)
+    if color is not None and strength is not None and "emission_strength" not in result.recovered:
+        glows = strength.linked or (color.linked and strength.value != 0.0)
+        notes += [_GLOW_HELD] if glows else []
     return tuple(notes)
 
 
