@@ -10,7 +10,7 @@ from dataclasses import dataclass
 import bpy
 
 from ..export.nodes.closure_leaves import ClosureLeaf, Factor
-from ..export.nodes.leaf_kinds import TRANSPARENT, UNUSED_SOCKETS, inputs_of, is_fitted, kind_of, shines
+from ..export.nodes.leaf_kinds import CLEAR_SHADERS, TRANSPARENT, UNUSED_SOCKETS, inputs_of, is_fitted, kind_of, shines
 from ..export.nodes.shader_graph import plain_value
 from ..export.nodes.target_shader import DIRECTIONS, TargetShader, leaf_name
 from ..versions import PRINCIPLED
@@ -18,9 +18,8 @@ from .place import INPUT, Place
 from .ranges import BY_DEFAULT
 from .table import WEIGHT, GraphValue, graph_values, named_apart, one_word
 
-# what a leaf has to have so that light only returns from it, and none is its own
+# what a leaf has to have so that it scatters all light, and none is its own
 OPAQUE = {"Alpha": 1.0, "Transmission Weight": 0.0, "Emission Strength": 0.0}
-OPAQUE_SHADERS = ("principled", "glossy", "conductor", "toon", "toon_glossy", "subsurface")
 NOT_FITTED = (
     *("Weight", "Alpha", "Transmission Weight", "Emission Color", "Emission Strength", "Subsurface Weight"),
     *(*DIRECTIONS, *UNUSED_SOCKETS),
@@ -58,25 +57,24 @@ def inside_values(target: TargetShader) -> Sequence[GraphValue | MixValue]:
     """The values beside the sockets of the target that a fit may change: of a mix the others', and of its nodes."""
     if not target.is_mixed:
         return graph_values(target)
-    if is_cut_out(target):  # holes stay as they are, and with them what the mix is made of
-        return [value for value in graph_values(target) if not any(_is_of_mix(name) for name in value.sockets)]
-    values: list[GraphValue | MixValue] = [*mix_values(target)]
-    return named_apart(values + graph_values(target)) if why_no_mix_values(target) is None else []
+    if why_no_mix_values(target) is not None and not all(_is_hole(leaf.node) for leaf in target.others):
+        return []
+    has_holes = any(_is_hole(leaf.node) for leaf in target.others)  # which stay as they are, and so do all weights
+    of_nodes = [value for value in graph_values(target) if not (has_holes and _is_weight(value))]
+    return named_apart([*mix_values(target), *of_nodes])
 
 
-def is_cut_out(target: TargetShader) -> bool:
-    """Whether a mix is of one shader that reflects and of Transparent, of one grey each."""
-    others = [leaf.node for leaf in target.others]
-    return bool(others) and all(node.bl_idname == TRANSPARENT and _is_grey(node.inputs["Color"]) for node in others)
+def _is_hole(node: bpy.types.Node) -> bool:
+    """Whether a leaf is Transparent of one grey."""
+    if node.bl_idname != TRANSPARENT:
+        return False
+    color = node.inputs["Color"]
+    return not color.is_linked and len(set(plain_value(color)[:3])) == 1
 
 
-def _is_grey(socket: bpy.types.NodeSocket) -> bool:
-    return not socket.is_linked and len(set(plain_value(socket)[:3])) == 1
-
-
-def _is_of_mix(socket: str) -> bool:
-    """Whether the name of a socket is that of another shader's, or of a weight."""
-    return "/" in socket or socket == WEIGHT
+def _is_weight(value: GraphValue) -> bool:
+    """Whether it reaches the weight of a shader."""
+    return any(name.rpartition("/")[2] == WEIGHT for name in value.sockets)
 
 
 def default_values(target: TargetShader, *, all_leaves: bool) -> list[GraphValue | MixValue]:
@@ -91,20 +89,22 @@ def _is_default(value: GraphValue | MixValue, target: TargetShader, *, all_leave
     if isinstance(value, MixValue):
         return all_leaves and value.by_default
     of_one = not any("/" in name for name in value.sockets)
-    is_weight = any(name.rpartition("/")[2] == WEIGHT for name in value.sockets) and target.is_mixed
+    is_weight = _is_weight(value) and target.is_mixed
     return value.range.group in BY_DEFAULT and not is_weight and (all_leaves or of_one)
 
 
 def why_no_mix_values(target: TargetShader) -> str | None:
     """What keeps values of a mix from being fitted beside the chosen leaf, as the end of a sentence."""
     for leaf in (target.leaf, *target.others):
-        if shines(leaf.node):
+        if shines(leaf.node) or _is_hole(leaf.node):
             continue
         kind = kind_of(leaf.node)
         if kind is None:
             return f"'{leaf_name(leaf)}' has no model in the fit"
-        if kind.shader not in OPAQUE_SHADERS:
+        if kind.shader in CLEAR_SHADERS:
             return f"'{leaf_name(leaf)}' lets light through"
+    if target.volume is not None:
+        return "light goes through it into a volume"
     for leaf in (target.leaf, *target.others):
         problem = _not_plain(leaf)
         if problem is not None:
@@ -167,7 +167,7 @@ def _factors(target: TargetShader) -> list[Factor]:
     held = {
         _place(factor)
         for leaf in leaves
-        if shines(leaf.node) or (leaf.is_linked and len(leaf.ways) > 1)
+        if shines(leaf.node) or _is_hole(leaf.node) or (leaf.is_linked and len(leaf.ways) > 1)
         for way in leaf.ways
         for factor in way
     }

@@ -67,7 +67,7 @@ class MitsubaPrincipled:
             If the material transmits light.
         """
         if "spec_trans" in free or given.get("spec_trans", 0.0) != 0.0:
-            raise UnrecordableError("The material has 'spec_trans' and recorded paths hold reflected light only.")
+            raise UnrecordableError("The material has 'spec_trans', which recorded paths do not hold.")
         unused = {"spec_trans", "specular" if "eta" in {*given, *free} else "eta", *free}
         return {p.name: given.get(p.name, p.default) for p in self.table if p.name not in unused}
 

@@ -75,7 +75,7 @@ class RecordedModel(Protocol):
 
 
 class BlenderPrincipledModel:
-    """Blender's Principled BSDF, opaque."""
+    """Blender's Principled BSDF, without holes and glass."""
 
     name: str = "blender_principled"
     table: ParameterTable = BLENDER_PRINCIPLED
@@ -92,12 +92,10 @@ class BlenderPrincipledModel:
 
     def values(self, given: Mapping[str, Value | None], free: Collection[str]) -> dict[str, Value | None]:
         """See `RecordedModel`."""
-        if self._cycles.shader == "translucent":
-            raise UnrecordableError("The material is translucent and recorded paths hold reflected light only.")
         given = dict(given) | {"alpha": 1.0}  # as many camera rays end on it as its alpha says
         for name, opaque in (("transmission_weight", 0.0), ("alpha", 1.0)):
             if name in free or given.get(name, opaque) != opaque:
-                raise UnrecordableError(f"The material has {name!r} and recorded paths hold reflected light only.")
+                raise UnrecordableError(f"The material has {name!r}, which recorded paths do not hold.")
         return {p.name: given.get(p.name, p.default) for p in self.table if p.name not in free}
 
     def bind(self, fixed: Mapping[str, Value | None], free: Collection[str]) -> Evaluate:

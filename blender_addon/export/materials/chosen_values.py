@@ -17,7 +17,6 @@ from ...graph_values.own_groups import shared_groups
 from ...graph_values.place import read
 from ...graph_values.table import WEIGHT, GraphValue, GraphValueError, named, plain_name
 from ...process.saved_file import save_copy
-from ...versions import PRINCIPLED
 from ..camera.camera_model import Region, edges_of
 from ..camera.render_region import picture_size
 from ..findings import ExportError, Findings
@@ -25,10 +24,9 @@ from ..fitted_slot import FittedSlot
 from ..material_model import Material
 from ..nodes.displacement import SHADING_NORMAL
 from ..nodes.graph_findings import graph_problem
-from ..nodes.leaf_kinds import KINDS, OPAQUE
+from ..nodes.leaf_kinds import CLEAR_SHADERS, KINDS, OPAQUE
 from ..nodes.shader_graph import plain_value
 from ..nodes.target_shader import DIRECTIONS, TargetShader, fits_all_leaves, target_shader
-from ..nodes.volumes import lets_light_in
 
 COPY = "scene.blend"  # of the file, in the folder of the graph's pictures: the backend has it evaluated
 ON_RECORDED_LIGHT = ("fast", "balanced", "best")
@@ -102,8 +100,10 @@ def _not_fitted(target: TargetShader, fit: dict[str, Any]) -> str | None:
             continue  # holes that stay as they are
         if socket.is_linked or plain_value(socket) != opaque:
             return f"a fit of them needs an opaque material, and {name} is {'linked' if socket.is_linked else 'set'}"
-    if target.leaf.node.bl_idname != PRINCIPLED and lets_light_in(target.leaf):
+    if KINDS[target.leaf.node.bl_idname].shader in CLEAR_SHADERS:
         return f"a fit of them needs an opaque material, and '{target.name}' lets light through"
+    if target.volume is not None:
+        return "a fit of them needs an opaque material, and light goes through this one into a volume"
     return None
 
 

@@ -48,6 +48,7 @@ class LeafKind:
     nearest: bool = False
 
 
+CLEAR_SHADERS = ("glass", "refraction")  # of those that light goes straight through, all others scatter it
 METALLIC, TOON = "ShaderNodeBsdfMetallic", "ShaderNodeBsdfToon"
 KINDS: dict[str, LeafKind] = {
     PRINCIPLED: LeafKind(),

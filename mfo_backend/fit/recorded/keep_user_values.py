@@ -17,7 +17,7 @@ from ...types.image import Pixels
 from ...types.parameter import ParameterTable
 from ..alike.compare import rival_notes
 from ..alike.unneeded_lobes import box_holding, dispensable, moved_to_user, unneeded_lobes, with_user_details
-from ..certainty.covariance import certainties, covariance, standard_deviations, with_rivals
+from ..certainty.covariance import certainties, covariance, standard_deviations, with_own_light, with_rivals
 from ..result.outcome import kept_note
 from ..squares.problem import Problem, Refined
 from ..squares.recording_noise import rows_of_samples
@@ -116,6 +116,7 @@ class Judged:
         coarser = None if problem.coarser is None else self._rows_of(problem.coarser, x)
         spread = covariance(*self.rows(x), table, self.model_error, coarser=coarser)
         spread = with_rivals(spread, x, self._rivals, table.width)
+        spread = with_own_light(spread, x, self._setting.scene.needs.own, table)
         return 2.0 * problem.equations(x).cost, certainties(standard_deviations(spread, table), table, spread), spread
 
     @property

@@ -36,6 +36,7 @@ NOISIER = 1.25
 # without it, are 0.9 % off; with twice as much 1.1 % (docs/notebook/several_materials.md). Smaller: recordings that
 # follow noise.
 OWN_LIGHT = 0.01
+TINY = 1e-30  # of a square that may be 0
 
 
 @dataclass(frozen=True, eq=False)
@@ -110,7 +111,7 @@ def _recorded_near(setting: Setting, stage: Stage, start: Vector, number: int) -
     `number` is how many recordings there were before.
     """
     plan, last = setting.plan, number + MOST_RECORDINGS
-    grid = plan.grid_last
+    grid, step = plan.grid_last, None
     finest = partial(setting.scene.finest_grid, SAMPLES)
     while True:
         number += 1
@@ -125,7 +126,30 @@ def _recorded_near(setting: Setting, stage: Stage, start: Vector, number: int) -
         if not (moved or finer > grid) or number == last or setting.course.should_stop():
             return recording, x, grid
         del few, recording
-        start, grid = x, finer
+        step = _Step.after(step, (x - start) / setting.table.width)
+        start, grid = start + step.share * (x - start), finer
+
+
+@dataclass(frozen=True, eq=False)
+class _Step:
+    """How far a solve has gone from the material of its recording, in widths of the bounds, and the share of that which
+    the next recording goes.
+
+    Light that the target gives itself makes too dark a material of too bright a one, and again. The share is Aitken's
+    for vectors (Irons and Tuck, "A version of the Aitken accelerator for computer iteration", 1969), at most the whole.
+    """
+
+    away: Vector
+    share: float
+
+    @staticmethod
+    def after(last: _Step | None, away: Vector) -> _Step:
+        """The step after another one."""
+        if last is None:
+            return _Step(away, 1.0)
+        turn = away - last.away
+        share = -last.share * float(np.dot(last.away, turn)) / max(float(np.dot(turn, turn)), TINY)
+        return _Step(away, min(share, 1.0) if share > 0.0 else 1.0)
 
 
 def _is_old(change: float, indirect: float) -> bool:

@@ -134,23 +134,23 @@ class ClosureTree(mi.BSDF):
         return (self.fitted, *self.held)
 
     @property
-    def is_opaque(self) -> bool:
-        """Whether light only returns from the side that it comes from, but for what the fitted material lets through.
+    def is_held_in_lanes(self) -> bool:
+        """Whether lanes of a first hit hold it, but for what the fitted material is: no glass, and holes of one grey.
 
-        A held material lets light through if it is glass, cut out or translucent.
+        A held material is no part of lanes if it is glass or cut out; what is translucent has lanes on both sides.
         """
-        return not self.clear and not any(leaf.material.lets_in for leaf in self.held)
+        is_grey = [not isinstance(c, mi.Texture) and float(np.ptp(np.ravel(c))) == 0.0 for c, _ in self.clear]
+        return all(is_grey) and not any(leaf.material.is_clear for leaf in self.held)
 
     @property
-    def has_grey_holes(self) -> bool:
-        """Whether only Transparent of one grey, whatever its share, keeps it from being opaque."""
-        is_grey = [not isinstance(c, mi.Texture) and float(np.ptp(np.ravel(c))) == 0.0 for c, _ in self.clear]
-        return bool(is_grey) and all(is_grey) and not any(leaf.material.lets_in for leaf in self.held)
+    def is_translucent(self) -> bool:
+        """Whether light is scattered to the other side."""
+        return any(leaf.material.is_translucent for leaf in self.leaves)
 
     @property
     def absorbing(self) -> BlenderPrincipled | None:
         """The fitted material, which has the values of the volume, if that takes of the light inside."""
-        absorbs = self.fitted.material.absorbs and not (self.is_opaque and not self.fitted.material.lets_in)
+        absorbs = self.fitted.material.absorbs and (self.clear or any(leaf.material.lets_in for leaf in self.leaves))
         return self.fitted.material if absorbs else None
 
     @property

@@ -155,7 +155,17 @@ class BlenderPrincipled(mi.BSDF):
     @property
     def lets_in(self) -> bool:
         """Whether light gets to the other side of the surface."""
-        return self.lobes.transmission or self.lobes.alpha or self.model.shader == "translucent"
+        return self.is_clear or self.is_translucent
+
+    @property
+    def is_clear(self) -> bool:
+        """Whether light goes through it by refraction or holes."""
+        return self.lobes.transmission or self.lobes.alpha
+
+    @property
+    def is_translucent(self) -> bool:
+        """Whether it scatters light to the other side."""
+        return self.model.shader == "translucent"
 
     @property
     def has_below(self) -> bool:

@@ -16,6 +16,9 @@ import mitsuba as mi
 # Of the samples, about the normal of a coat. A coat's bump was 0.79 % too dark without and 0.36 % with it (96 x 96,
 # docs/notebook/graph_values.md); other shares were not tried. Larger: what is below the coat has more noise.
 COAT_SHARE = 0.2
+# Of the samples, to the other side of a surface whose light comes through. Other shares were not tried. Larger: what
+# reflects has more noise.
+THROUGH_SHARE = 0.4
 LEAST_ROUGHNESS, ROUGH_COAT = 0.03, 0.1  # the least of a narrow lobe, and a coat's where nodes give it. No measurement
 
 
@@ -28,12 +31,14 @@ class DefensiveProposal:
     numbers are data, so that every one of them uses the same kernels. A coat with a normal of its own, of a
     `coat_roughness`, has a lobe besides, about what callers give as `coat`: other lobes hardly ever meet its mirrored
     view, and the mean of a few recordings was 0.8 % too dark. The cosine lobe is about the normal of diffuse lobes
-    where callers give that as `diffuse`: part of its side may be below the microfacets'.
+    where callers give that as `diffuse`: part of its side may be below the microfacets'. A material that light comes
+    `through` has a cosine lobe on the other side, too.
     """
 
     roughness: tuple[float, float, float, float] = (0.1, 0.25, 0.5, 1.0)
     share: tuple[float, float, float, float] = (0.25, 0.25, 0.2, 0.0)
     coat_roughness: float | None = None
+    through: bool = False
 
     @property
     def cosine_share(self) -> float:
@@ -73,11 +78,29 @@ class DefensiveProposal:
         diffuse: mi.Vector3f | None = None,
     ) -> mi.Vector3f:
         """A direction in the shading frame for the random numbers `lobe` and `u` in [0, 1)."""
+        if not self.through:
+            return self._reflected(wi, lobe, u, coat, diffuse)
+        cosine = mi.warp.square_to_cosine_hemisphere(u)
+        beyond = -(cosine if diffuse is None else mi.Frame3f(diffuse).to_world(cosine))
+        others = self._reflected(wi, (lobe - THROUGH_SHARE) / (1.0 - THROUGH_SHARE), u, coat, diffuse)
+        if diffuse is None:  # of these `density` knows none below the surface
+            others = dr.select(others.z > 0.0, others, 0.0)
+        return dr.select(lobe < THROUGH_SHARE, beyond, others)
+
+    def _reflected(
+        self,
+        wi: mi.Vector3f,
+        lobe: mi.Float,
+        u: mi.Point2f,
+        coat: mi.Vector3f | None,
+        diffuse: mi.Vector3f | None,
+    ) -> mi.Vector3f:
+        """`sample` of the lobes that reflect."""
         if coat is not None:
             frame = mi.Frame3f(coat)
             local = frame.to_local(wi)
             mirrored = mi.reflect(local, self._of_coat.sample(local, u)[0])
-            others = self.sample(wi, (lobe - COAT_SHARE) / (1.0 - COAT_SHARE), u, None, diffuse)
+            others = self._reflected(wi, (lobe - COAT_SHARE) / (1.0 - COAT_SHARE), u, None, diffuse)
             return dr.select(lobe < COAT_SHARE, frame.to_world(mirrored), others)
         wo = mi.warp.square_to_cosine_hemisphere(u)
         if diffuse is not None:
@@ -99,7 +122,17 @@ class DefensiveProposal:
         coat: mi.Vector3f | None = None,
         diffuse: mi.Vector3f | None = None,
     ) -> mi.Float:
-        """Probability per solid angle of `sample`; without `diffuse` 0 below the surface."""
+        """Probability per solid angle of `sample`; of what only reflects, without `diffuse`, 0 below the surface."""
+        if not self.through:
+            return self._reflected_density(wi, wo, coat, diffuse)
+        cosine = dr.maximum(-wo.z if diffuse is None else -dr.dot(diffuse, wo), 0.0) / dr.pi
+        beyond = dr.select(wi.z > 0.0, cosine, 0.0)
+        return THROUGH_SHARE * beyond + (1.0 - THROUGH_SHARE) * self._reflected_density(wi, wo, coat, diffuse)
+
+    def _reflected_density(
+        self, wi: mi.Vector3f, wo: mi.Vector3f, coat: mi.Vector3f | None, diffuse: mi.Vector3f | None
+    ) -> mi.Float:
+        """`density` of the lobes that reflect."""
         if coat is not None:
             frame = mi.Frame3f(coat)
             from_coat, to_coat = frame.to_local(wi), frame.to_local(wo)
@@ -107,7 +140,7 @@ class DefensiveProposal:
             own = self._of_coat.pdf(from_coat, middle) / (4.0 * dr.dot(to_coat, middle))
             kept = (to_coat.z > 0.0) & (wo.z > 0.0) if diffuse is None else middle.z > 0.0
             own = dr.select((from_coat.z > 0.0) & kept, own, 0.0)
-            return COAT_SHARE * own + (1.0 - COAT_SHARE) * self.density(wi, wo, None, diffuse)
+            return COAT_SHARE * own + (1.0 - COAT_SHARE) * self._reflected_density(wi, wo, None, diffuse)
         half = dr.normalize(wi + wo)
         cosine, lobes = self._lobes
         result = cosine * mi.warp.square_to_cosine_hemisphere_pdf(wo) if diffuse is None else mi.Float(0.0)

@@ -42,7 +42,7 @@ class _Hits:
 
     Of a mix there is the `plugin`, and `own` are the hits in the frame of the mesh, which its held materials take.
     Of a material whose lobes have normals of their own `diffuse` is that of diffuse ones; `coat` is that of a coat of
-    its own, and `smooth` the mesh's, of a mix.
+    its own, and `smooth` the mesh's, of a mix. Light comes `through` some.
     """
 
     si: Any
@@ -55,9 +55,12 @@ class _Hits:
     coat: Any = None
     smooth: Any = None
     diffuse: Any = None
+    through: bool = False
 
     def lit(self, wo: mi.Vector3f) -> mi.Bool:
         """Whether light from `wo` reaches the material: below the plane of its microfacets may lie what others see."""
+        if self.through:
+            return wo.z != 0.0
         lit = wo.z > 0.0 if self.smooth is None else dr.dot(self.smooth, wo) > 0.0
         return lit if self.diffuse is None else lit | (dr.dot(self.diffuse, wo) > 0.0)
 
@@ -67,7 +70,7 @@ class _Hits:
         given = (self.own, self.coat, self.smooth, self.diffuse)
         own, coat, smooth, diffuse = (None if a is None else dr.gather(type(a), a, ray) for a in given)
         held = tuple(dr.gather(type(a), a, ray) for a in self.held)
-        return _Hits(si, position, share, held, self.pixels, self.plugin, own, coat, smooth, diffuse)
+        return _Hits(si, position, share, held, self.pixels, self.plugin, own, coat, smooth, diffuse, self.through)
 
 
 def record_paths(
@@ -132,7 +135,8 @@ def record_paths(
             si if sampled or settings.mixed else (), own, coat, smooth, diffuse, position, filter_weight, share, held
         )
         plugin = shape.bsdf() if settings.mixed else None
-        hits = _Hits(si, position, share, held, len(rays.pixel), plugin, own, coat, smooth, diffuse)
+        through = settings.proposal.through
+        hits = _Hits(si, position, share, held, len(rays.pixel), plugin, own, coat, smooth, diffuse, through)
         exact = [part for part in _delta_lights(scene, hits, shadows) if dr.width(part.position) > 0]
         if radiance is not None:
             nowhere = dr.zeros(mi.Vector3f, dr.width(position))
@@ -286,7 +290,8 @@ def _sampled_lights(
         ds, value = emitter.sample_direction(si, mi.Point2f(*u), front)
         wo = si.to_local(ds.d)
         lit = front & (ds.pdf > 0.0) & hits.lit(wo) & (dr.max(value) > 0.0)
-        passed = shadows.passed(si, ds, lit)
+        # which side light comes from is for the mesh to say, not for a bump
+        passed = shadows.passed(si if hits.own is None else hits.own, ds, lit)
         value *= shadows.left(passed)
         lit &= dr.max(value) > 0.0
         light_density = ds.pdf * choice
@@ -303,7 +308,9 @@ def _sampled_lights(
     lobe, *u = even_points(3, number, tile, tiles, settings.seed + 0x51ED270)
     wo = proposal.sample(si.wi, lobe, mi.Point2f(*u), hits.coat, hits.diffuse)
     density = proposal.density(si.wi, wo, hits.coat, hits.diffuse)
-    valid = front & hits.lit(wo) & (density > 0.0) & leaves_on(scene, si, wo, False)
+    valid = front & hits.lit(wo) & (density > 0.0)
+    if not hits.through:  # else some lobe sends light to either side
+        valid &= leaves_on(scene, si, wo, False)
     ray = shadows.starts.ray(si, si.to_world(wo))
     met = scene.ray_intersect_preliminary(ray, active=valid)
     far = met.compute_surface_interaction(ray, mi.RayFlags.All, valid)

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property, partial
 
 import mitsuba as mi
@@ -62,13 +62,15 @@ DIRECT, DEEPEST_RECORDED = 2, 16  # path length of light that comes from lights 
 class SceneNeeds:
     """What a recording of this scene has to hold, and why something is left out (sentences for the report).
 
-    `indirect` is the light over other surfaces that it holds, relative to the direct light.
+    `indirect` is the light over other surfaces that it holds, relative to the direct light; `own` is the part of all
+    light that a shell which light comes through may have given itself.
     """
 
     sampled: bool
     depth: int
     notes: tuple[str, ...]
     indirect: float = 0.0
+    own: float = 0.0
 
 
 class RecordedScene:
@@ -109,9 +111,14 @@ class RecordedScene:
         self.model = recorded_model(renderer.model, bsdf, renderer.mix, glows=self._glows, walks=walks)
         given = values_in_scene(bsdf, self.model)
         cut_out = given.get("alpha", 1.0) != 1.0
-        if self._mixed and (cut_out or not (bsdf.is_opaque or bsdf.has_grey_holes)):
+        if self._mixed and (cut_out or not bsdf.is_held_in_lanes):
             raise UnrecordableError("The material is mixed with one that lets light through.")
-        self._cut_out = cut_out or (self._mixed and not bsdf.is_opaque)
+        if getattr(bsdf, "absorbing", None) is not None:
+            raise UnrecordableError("The material lets light into a volume.")
+        self._cut_out = cut_out or (self._mixed and bool(bsdf.clear))
+        self._through = getattr(bsdf, "is_translucent", False)
+        if self._through and renderer.mix is None and renderer.graph is None:
+            raise UnrecordableError("The material lights itself from within: whole light paths know by how much.")
         self._fixed = self.model.values(given, renderer.table.names)
         self._bumped = bool(getattr(renderer.shape.bsdf(), "bumped", False))
         self._fixed |= dict.fromkeys((*self.model.normals.names, *self.model.walks.names))
@@ -151,12 +158,18 @@ class RecordedScene:
         width, height = (int(n) for n in scene.sensors()[0].film().crop_size())
         stride = max(1, math.ceil(math.sqrt(width * height / PROBE_RAYS)))
         share = indirect_share(
-            scene, self.renderer.shape, depth, self.model.two_sided, self.renderer.light_paths, stride=stride
+            scene,
+            self.renderer.shape,
+            depth,
+            self.model.two_sided,
+            self.renderer.light_paths,
+            stride=stride,
+            through=self._through,
         )
         if share < NEGLIGIBLE_INDIRECT and not self._walks:  # the probe knows none of what goes through surfaces
             note = f"Light over other surfaces is left out: it is {100 * share:.2g} % of the direct light."
             return SceneNeeds(sampled, DIRECT, (note,))
-        return SceneNeeds(True, depth, (), share)
+        return SceneNeeds(True, depth, (), share, share / (1.0 + share) if self._through else 0.0)
 
     def record(
         self,
@@ -361,7 +374,8 @@ class RecordedScene:
         width = self._width(vector) if near else None
         proposal = DefensiveProposal() if width is None else DefensiveProposal.around(width)
         is_turned = self._bumped and "coat_normal" in self.renderer.shape.bsdf().directions
-        return proposal.with_coat(self._value(vector, "coat_roughness")) if is_turned else proposal
+        proposal = proposal.with_coat(self._value(vector, "coat_roughness")) if is_turned else proposal
+        return replace(proposal, through=self._through)
 
     def _width(self, vector: NDArray[np.float64]) -> float | None:
         """The narrowest of the main lobes' widths; None where textures give all of them."""

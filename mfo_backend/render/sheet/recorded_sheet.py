@@ -74,7 +74,8 @@ class RecordedSheet:
         found = [scene.needs for scene in self._scenes]
         depth = max(needs.depth for needs in found)
         notes = found[0].notes if depth == 2 else ()
-        return SceneNeeds(any(n.sampled for n in found), depth, notes, max(n.indirect for n in found))
+        indirect, own = max(n.indirect for n in found), max(n.own for n in found)
+        return SceneNeeds(any(n.sampled for n in found), depth, notes, indirect, own)
 
     def record(
         self,

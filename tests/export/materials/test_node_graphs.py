@@ -4,7 +4,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -143,20 +143,22 @@ def test_the_recorded_picture_is_cycles(
     assert np.sqrt(np.mean((found - truth) ** 2)) / truth.mean() < most
 
 
-def renderer_and_cycles(export: Any, render_cycles: Any, target: Any) -> tuple[Any, Any]:
-    """The renderer of the exported job, and the picture by Cycles."""
+def renderer_and_cycles(
+    export: Any, render_cycles: Any, target: Any, parameters: Sequence[str] | None = None
+) -> tuple[Any, Any]:
+    """The renderer of the exported job, where these are fitted, and the picture by Cycles."""
     from mfo_backend.render.pictures.renderer import load_renderer
 
     wanted = render_cycles()
-    report = export(target, reference=None)
+    report = export(target, reference=None, fit={} if parameters is None else {"parameters": parameters})
     request = json.loads((report.folder / "request.json").read_text())
     request["reference"] = {"path": "scene.xml", "encoding": "linear"}  # there is none, and nobody reads it
     (report.folder / "request.json").write_text(json.dumps(request))
     folder = JobFolder.open(report.folder)
     request = read_request(folder)
-    parameters = request.fit.parameters if isinstance(request.fit.parameters, tuple) else ["ior"]
+    names = request.fit.parameters if isinstance(request.fit.parameters, tuple) else ["ior"]
     renderer = load_renderer(
-        folder.root / request.scene, request.target.shape_id, model="blender_principled", parameters=parameters,
+        folder.root / request.scene, request.target.shape_id, model="blender_principled", parameters=names,
         materials=request_materials(folder, request), light_paths=request.light_paths,
     )  # fmt: skip
     return renderer, wanted

@@ -177,9 +177,10 @@ def test_the_socket_of_a_glossy_bsdf_that_is_left_out_is_named(scene: Any, linke
 
 
 def test_a_mix_whose_other_shader_cannot_be_fitted_says_so(scene: Any) -> None:
-    """Of a lampshade's Translucent BSDF nothing can be chosen; where both reflect the other may be."""
+    """Of a pane's Glass BSDF nothing can be chosen; where both scatter light the other may be."""
     for kind, said in (
-        ("Translucent", "is held, for 'Translucent BSDF' lets light through."),
+        ("Glass", "is held, for 'Glass BSDF' lets light through."),
+        ("Translucent", "is chosen."),
         ("Glossy", "is chosen."),
     ):
         material = new_material("Target")

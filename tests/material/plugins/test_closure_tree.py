@@ -76,8 +76,9 @@ def test_what_passes_straight_is_the_sum_of_clear_colours_by_weights() -> None:
     clear = {"clear_0": 0.5, "clear_weight_0": 0.4, "clear_1": [1.0, 0.5, 0.0], "clear_weight_1": 0.1}
     passed = np.array(tree(**clear).eval_null_transmission(seen(), True)).ravel()
     np.testing.assert_allclose(passed, [0.4 * 0.5 + 0.1 * c for c in (1.0, 0.5, 0.0)], rtol=1e-6)
-    assert not tree(**clear).is_opaque
-    assert tree().is_opaque
+    assert not tree(**clear).is_held_in_lanes
+    assert tree(clear_0=0.5).is_held_in_lanes
+    assert tree().is_held_in_lanes
 
 
 def test_samples_have_the_density_and_the_albedo_of_the_sum() -> None:

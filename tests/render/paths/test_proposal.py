@@ -3,6 +3,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import drjit as dr
 import mitsuba as mi
 import numpy as np
@@ -32,6 +34,22 @@ def test_samples_follow_the_density(name, cosine):
     valid = above & (density > 0)
     ratio = np.where(valid, 1.0 / np.maximum(density, 1e-9), 0.0)
     assert np.mean(ratio * np.array(wo.z)) == pytest.approx(np.pi, rel=0.01)  # 400 000 samples of weight at most 2 pi
+
+
+@pytest.mark.parametrize("diffuse", [None, (0.4, 0.0, 0.917)], ids=["plain", "bumped"])
+def test_light_from_behind_has_a_lobe_on_the_other_side(diffuse):
+    """The integral of 1 + cos over all directions, which samples of a wrong density miss on either side."""
+    proposal, n = replace(DefensiveProposal.around(0.3), through=True), 400_000
+    normal = None if diffuse is None else mi.Vector3f(*diffuse)
+    wi = mi.Vector3f(0.6, 0.0, 0.8)
+    sampler = mi.load_dict({"type": "independent"})
+    sampler.seed(1, n)
+    wo = proposal.sample(wi, sampler.next_1d(), sampler.next_2d(), None, normal)
+    density, z = np.array(proposal.density(wi, wo, None, normal)), np.array(wo.z)
+    for side in (z > 0.0, z < 0.0):
+        valid = side & (density > 0.0)
+        ratio = np.where(valid, np.abs(z) / np.maximum(density, 1e-9), 0.0)
+        assert np.mean(ratio) == pytest.approx(np.pi, rel=0.015)
 
 
 def test_no_weight_explodes():

@@ -109,8 +109,11 @@ def test_a_free_strength_scales_what_a_texture_gives(tmp_path):
     """Oracle: Mitsuba's own area light of the same picture."""
     import mitsuba as mi
 
+    from mfo_backend.render.pictures.mitsuba_renderer import two_threads
+
     colors = np.random.default_rng(4).random((4, 4, 3)).astype(np.float32)
-    mi.Bitmap(colors).write(str(tmp_path / "glow.exr"))
+    with two_threads():
+        mi.Bitmap(colors).write(str(tmp_path / "glow.exr"))
     sockets = {
         "Base Color": {"value": [0.0, 0.0, 0.0], "linked": False},
         "Emission Color": {"value": [0.5, 0.5, 0.5], "linked": True, "texture": str(tmp_path / "glow.exr")},
@@ -132,6 +135,8 @@ def test_a_free_strength_scales_what_a_texture_gives(tmp_path):
     textured = f'<texture type="bitmap" name="radiance"><string name="filename" value="{tmp_path / "glow.exr"}"/>'
     textured += '<boolean name="raw" value="true"/></texture></emitter>'
     text = path.read_text("utf-8").replace(GLOW, f'<emitter type="area">{textured}').replace(POINT, "")
-    expected = groups.average(1.5 * np.array(mi.render(mi.load_string(text), spp=256)))
+    with two_threads():
+        lit = mi.load_string(text)
+    expected = groups.average(1.5 * np.array(mi.render(lit, spp=256)))
     np.testing.assert_allclose(got[:, :, -1], expected, rtol=0.03, atol=0.005)
     np.testing.assert_allclose(got[:, :, 0], groups.average(renderer.image(x, seed=7, spp=256)), rtol=0.02, atol=0.002)
