@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ...material.principled.blender_selection import AMOUNT_OF
+from ...material.principled.blender_selection import AMOUNT_OF, PLAIN
 from ...material.principled.principled_dict import socket_value
 from ...material.principled.principled_parameters import BLENDER_PRINCIPLED, PARAMETER_OF_SOCKET, SOCKET_OF_PARAMETER
 from ...metrics.display.tone_mapping import View
@@ -29,6 +29,9 @@ from ...types.verdict import Cause, Judgement, Verdict
 GLASS = {"Transmission Weight": 1.0, "Metallic": 0.0, "Alpha": 1.0, "Roughness": 0.1, "Base Color": [0.9, 0.9, 0.9]}
 CUT_OUT = {"Alpha": 0.5, "Transmission Weight": 0.0}
 OPAQUE = {"Transmission Weight": 0.0, "Alpha": 1.0}
+TINTED = OPAQUE | {"Coat Weight": 0.5, "Coat Tint": [0.5, 0.5, 0.5]}
+FILMED = OPAQUE | {"Thin Film Thickness": 400.0}  # nanometres, where the first colours are
+CLAY = OPAQUE | {"Diffuse Roughness": 0.5}
 GLOWING = OPAQUE | {"Emission Color": [0.5, 0.5, 0.5]}
 _OF_GLASS = ("transmission_weight", "ior")
 # A glow adds to every pixel, so none is darker but by noise; of the median of the target, which may be clipped
@@ -83,6 +86,14 @@ def _or(classes: Sequence[MaterialClass]) -> str:
     return " or ".join(other.name for other in classes)
 
 
+# What an opaque material may have more of, by the value that is without effect in the scene
+_FURTHER = {
+    "coat_tint": MaterialClass("under a tinted coat", TINTED, ("coat_tint",), _OF_GLASS),
+    "thin_film_thickness": MaterialClass(
+        "under a thin film", FILMED, ("thin_film_thickness", "thin_film_ior"), _OF_GLASS
+    ),
+    "diffuse_roughness": MaterialClass("as rough as clay", CLAY, ("diffuse_roughness",), _OF_GLASS),
+}
 _CLASSES = (
     MaterialClass("of glass", GLASS),
     MaterialClass("cut out", CUT_OUT, ("alpha",), _OF_GLASS),
@@ -106,13 +117,16 @@ def other_classes(material: Mapping[str, Any], glow: float) -> list[MaterialClas
     shaders.
 
     Its own comes first if that changes more than a fit of `all` does. Then comes the one that glows, for its fit is the
-    quickest; its emission is at most of the radiance `glow`.
+    quickest; its emission is at most of the radiance `glow`. An opaque one may lack a lobe.
     """
     sockets = material["sockets"]
     if material.get("leaves"):
         return []
     own = _class_of(sockets)
-    classes = sorted((_glowing(glow), *_CLASSES) if glow > 0.0 else _CLASSES, key=lambda other: other.name != own)
+    quick = [_glowing(glow)] if glow > 0.0 else []
+    if own == "opaque":
+        quick += [further for name, further in _FURTHER.items() if value_of(material, name) == PLAIN.get(name, 0.0)]
+    classes = sorted((*quick, *_CLASSES), key=lambda other: other.name != own)
     return [
         other for other in classes
         if (other.name != own or other.also)

@@ -13,7 +13,7 @@ from xml.etree import ElementTree
 import numpy as np
 from numpy.typing import NDArray
 
-from ...material.principled.blender_selection import select_blender_parameters
+from ...material.principled.blender_selection import PLAIN, select_blender_parameters
 from ...material.principled.mix_values import mix_values
 from ...material.principled.principled_dict import (
     blender_principled_dict,
@@ -110,7 +110,7 @@ def _opened(target: Target, selection: str | Sequence[str], materials: Materials
         )
     sockets = materials[target.bsdf_id]["sockets"]
     linked = {PARAMETER_OF_SOCKET[name] for name, socket in sockets.items() if socket.get("linked") and name in SOCKETS}
-    present = [name for name, value in _constants(sockets).items() if value != 0.0]
+    present = [name for name, value in _constants(sockets).items() if value != PLAIN.get(name, 0.0)]
     # values inside nodes may be all that is fitted
     nothing = not isinstance(selection, str) and not selection
     chosen = None if nothing else select_blender_parameters(selection, present=present, linked=linked)
