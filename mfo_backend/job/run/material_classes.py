@@ -21,7 +21,7 @@ from ...material.principled.principled_parameters import BLENDER_PRINCIPLED, PAR
 from ...metrics.display.tone_mapping import View
 from ...types.certainty import Level
 from ...types.image import Encoding, Image
-from ...types.parameter import Value
+from ...types.parameter import Parameter, ParameterTable, Value
 from ...types.result import FitResult
 from ...types.verdict import Cause, Judgement, Verdict
 
@@ -53,7 +53,8 @@ class MaterialClass:
     """A class with the values it begins with, and what a user is told.
 
     A fit of it changes what `all` stands for, or with `also` that, but never what is named so. A class that `glows` is
-    believed only where its light is found on the surroundings, too.
+    believed only where its light is found on the surroundings, too. With `nodes` values inside nodes are fitted, too;
+    else they are those of the scene's material.
     """
 
     name: str
@@ -61,6 +62,7 @@ class MaterialClass:
     also: tuple[str, ...] = ()
     never: tuple[str, ...] = ()
     glows: bool = False
+    nodes: bool = False
 
     @property
     def note(self) -> str:
@@ -88,11 +90,11 @@ def _or(classes: Sequence[MaterialClass]) -> str:
 
 # What an opaque material may have more of, by the value that is without effect in the scene
 _FURTHER = {
-    "coat_tint": MaterialClass("under a tinted coat", TINTED, ("coat_tint",), _OF_GLASS),
+    "coat_tint": MaterialClass("under a tinted coat", TINTED, ("coat_tint",), _OF_GLASS, nodes=True),
     "thin_film_thickness": MaterialClass(
-        "under a thin film", FILMED, ("thin_film_thickness", "thin_film_ior"), _OF_GLASS
+        "under a thin film", FILMED, ("thin_film_thickness", "thin_film_ior"), _OF_GLASS, nodes=True
     ),
-    "diffuse_roughness": MaterialClass("as rough as clay", CLAY, ("diffuse_roughness",), _OF_GLASS),
+    "diffuse_roughness": MaterialClass("as rough as clay", CLAY, ("diffuse_roughness",), _OF_GLASS, nodes=True),
 }
 _CLASSES = (
     MaterialClass("of glass", GLASS),
@@ -196,7 +198,8 @@ def with_values_of(other: MaterialClass, result: FitResult, material: Mapping[st
         if (sure := certainty.get("emission_color")) is not None:
             certainty["emission_color"] = replace(sure, sd=tuple(sd / peak for sd in sure.sd))
             certainty["emission_strength"] = replace(sure, sd=(strength * max(sure.sd),))
-    bounds = {name: (BLENDER_PRINCIPLED[name].lower, BLENDER_PRINCIPLED[name].upper) for name in values}
+    own = [BLENDER_PRINCIPLED[name] for name in values if name in SOCKET_OF_PARAMETER]
+    bounds = {p.name: (p.lower, p.upper) for p in own}
     return replace(result, recovered=values, certainty=certainty, bounds=bounds | dict(result.bounds))
 
 
@@ -210,14 +213,26 @@ def doubted(result: FitResult, other: FitResult, material: Mapping[str, Any]) ->
 
     if not result.certainty:
         return result
-    table = BLENDER_PRINCIPLED.select(result.certainty)
-    near = {name: other.recovered.get(name, value_of(material, name)) for name in table.names}
+    table = ParameterTable(_parameter(name, result) for name in result.certainty)
+    near = {name: either({**other.initial, **other.recovered}, material, name) for name in table.names}
     away = table.pack(result.recovered) - table.pack(near)
     found = certainties_away(result.certainty, away, table)
     for name, certainty in found.items():
         if certainty.level is Level.NOT_VISIBLE and np.any(away[table.slice_of(name)]):
             found[name] = replace(certainty, level=Level.NOT_TOLD_APART)
     return replace(result, certainty=found)
+
+
+def _parameter(name: str, result: FitResult) -> Parameter:
+    if name in SOCKET_OF_PARAMETER:
+        return BLENDER_PRINCIPLED[name]
+    value = result.recovered[name]  # inside nodes
+    return Parameter(name, np.size(value), *result.bounds[name], default=value)
+
+
+def either(values: Mapping[str, Value], material: Mapping[str, Any], name: str) -> Value:
+    """A value where `values` have it, else as the material has it."""
+    return values[name] if name in values else value_of(material, name)
 
 
 def look_alike(first: Judgement, second: Judgement) -> bool:

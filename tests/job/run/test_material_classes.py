@@ -245,6 +245,24 @@ def test_a_plainer_material_that_looks_the_same_is_the_result():
     assert module.with_plainer(rich, material(), fails) is rich
 
 
+@pytest.mark.parametrize("verdict", [Verdict.CLOSE, Verdict.DIFFERENT])
+def test_a_class_may_hold_values_inside_nodes(verdict):
+    """Also after one that holds none: they begin as in the scene."""
+    clay, stop = named("as rough as clay"), "Color Ramp/Stop 0"
+    first, glow, again = fitted(0.2, verdict), fitted(0.09, verdict), fitted(0.01, Verdict.SAME)
+    inside = {"initial": {"metallic": 0.0, stop: 0.5}, "bounds": {stop: (0.0, 1.0)}}
+    first = replace(first, result=replace(first.result, recovered={"metallic": 0.4, stop: 0.6}, **inside))
+    sure = {stop: Certainty((0.004,), Level.DETERMINED)}
+    values = {"metallic": 0.1, "diffuse_roughness": 0.9, stop: 0.8}
+    again = replace(again, result=replace(again.result, recovered=values, certainty=sure, **inside))
+    between = module.better(first, glow, named("glowing"), material())
+    for before, was in ((first, 0.6), (between, 0.5)):
+        found = module.better(before, again, clay, material()).result
+        assert (found.recovered[stop], found.initial[stop]) == (0.8, 0.5)
+        away = 0.8 - was if verdict is Verdict.CLOSE else 0.0
+        assert found.certainty[stop].sd == pytest.approx((np.hypot(0.004, away),))
+
+
 def test_what_a_class_has_held_is_part_of_its_result():
     glass = material(Transmission_Weight=1.0, Metallic=0.0)
     opaque = named("opaque", glass)
