@@ -58,6 +58,8 @@ def with_other_classes(
     for other in classes:
         if not is_wanted(fitted):
             break
+        if not other.may_explain(fitted.result.judgement):
+            continue
         try:
             again = fit_from(other)
         except UnrecordableError:

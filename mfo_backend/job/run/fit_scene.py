@@ -250,7 +250,7 @@ def _fit_and_other_classes(job: _OneMaterial) -> tuple[Fitted, tuple[str, ...]]:
     visible = np.inf if before is None else before.target.visible
 
     def fit_from(other: MaterialClass, nearer_than: float) -> Fitted:
-        graphs = job.graphs if other.nodes and refused is None else ()
+        graphs = job.graphs if other.further and refused is None else ()
         again = job.load(parameters_of(other, names), graphs, lambda material: changed(material, other))
         return job.fit(again, nearer_than=nearer_than)
 

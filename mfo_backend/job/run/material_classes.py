@@ -53,8 +53,8 @@ class MaterialClass:
     """A class with the values it begins with, and what a user is told.
 
     A fit of it changes what `all` stands for, or with `also` that, but never what is named so. A class that `glows` is
-    believed only where its light is found on the surroundings, too. With `nodes` values inside nodes are fitted, too;
-    else they are those of the scene's material.
+    believed only where its light is found on the surroundings, too. One with `further` lobes is of the
+    scene's kind, so that values inside nodes are fitted, too; else they are those of the scene's material.
     """
 
     name: str
@@ -62,7 +62,11 @@ class MaterialClass:
     also: tuple[str, ...] = ()
     never: tuple[str, ...] = ()
     glows: bool = False
-    nodes: bool = False
+    further: bool = False
+
+    def may_explain(self, judgement: Judgement | None) -> bool:
+        """Whether it may be what a result lacks: further lobes cast no other shadow, and no light."""
+        return not self.further or judgement is None or judgement.cause not in _AROUND
 
     @property
     def note(self) -> str:
@@ -90,11 +94,11 @@ def _or(classes: Sequence[MaterialClass]) -> str:
 
 # What an opaque material may have more of, by the value that is without effect in the scene
 _FURTHER = {
-    "coat_tint": MaterialClass("under a tinted coat", TINTED, ("coat_tint",), _OF_GLASS, nodes=True),
+    "coat_tint": MaterialClass("under a tinted coat", TINTED, ("coat_tint",), _OF_GLASS, further=True),
     "thin_film_thickness": MaterialClass(
-        "under a thin film", FILMED, ("thin_film_thickness", "thin_film_ior"), _OF_GLASS, nodes=True
+        "under a thin film", FILMED, ("thin_film_thickness", "thin_film_ior"), _OF_GLASS, further=True
     ),
-    "diffuse_roughness": MaterialClass("as rough as clay", CLAY, ("diffuse_roughness",), _OF_GLASS, nodes=True),
+    "diffuse_roughness": MaterialClass("as rough as clay", CLAY, ("diffuse_roughness",), _OF_GLASS, further=True),
 }
 _CLASSES = (
     MaterialClass("of glass", GLASS),

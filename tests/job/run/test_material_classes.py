@@ -110,6 +110,24 @@ def test_another_class_is_worth_it_where_the_material_may_be_wrong():
     assert not is_worth_another(result(wrong, "mitsuba_principled"), "all")
 
 
+def test_further_lobes_do_not_explain_what_differs_around_the_target():
+    """A picture that a compositor had made brighter took three fits more."""
+    around = judgement(Verdict.DIFFERENT, Cause.LIGHT)
+    assert not named("as rough as clay").may_explain(around)
+    assert named("of glass").may_explain(around)  # which has another shadow
+    assert named("as rough as clay").may_explain(judgement(Verdict.DIFFERENT, Cause.MATERIAL))
+    tried = []
+    glowing, clay = named("glowing"), named("as rough as clay")
+    first = replace(fitted(0.2), result=replace(fitted(0.2).result, judgement=around))
+
+    def again(other):
+        tried.append(other.name)
+        return fitted(0.3)
+
+    module.with_other_classes(first, material(), [glowing, clay], again, lambda found: True)
+    assert tried == ["glowing"]
+
+
 def test_only_a_clearly_better_class_takes_the_place_of_the_scenes():
     first = judgement(Verdict.DIFFERENT, Cause.MATERIAL, 0.2)
     glowing, glass = named("glowing"), named("of glass")
