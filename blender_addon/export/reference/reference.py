@@ -85,7 +85,7 @@ def read_reference(
 
     `made` is one of `REFERENCE_VIEWS`. A display picture that was rendered in this scene comes with a table of the
     scene's view where no formula undoes that. `upright` turns a picture as its EXIF data say; else it is as stored.
-    `alpha` keeps the alpha channel of one that is written anew.
+    `alpha` keeps the alpha channel of one that is written anew, as it is kept of display colours that are straight.
 
     Raises
     ------
@@ -166,10 +166,12 @@ def _from_image(
     alpha: bool,
 ) -> Reference:
     try:
-        pixels = np.ascontiguousarray(read_pixels(image)[:, :, : 4 if alpha else 3])
+        pixels = read_pixels(image)
     except UnreadableImageError as problem:
         raise ExportError(f"The reference '{image.name}' {problem}.") from None
-    pixels = turned(pixels, turn)
+    if holds_display_colours(image) and image.alpha_mode in ("STRAIGHT", "PREMUL"):  # Blender divides bytes
+        alpha |= bool((pixels[:, :, 3] < 1.0).any())
+    pixels = turned(np.ascontiguousarray(pixels[:, :, : 4 if alpha else 3]), turn)
     height, width = pixels.shape[:2]
     refuse_size(image.name, (width, height), rendered, of_region=rendered != picture_size(scene.render))
     if rendered != size:
