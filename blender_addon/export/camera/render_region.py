@@ -24,10 +24,13 @@ def picture_size(render: bpy.types.RenderSettings) -> Size:
 
 
 def square_size(render: bpy.types.RenderSettings) -> Size:
-    """Return width and height of the frame in square pixels, more of them where pixels are not square."""
+    """Return width and height of the frame in square pixels, fewer of them where pixels are not square.
+
+    More of them would be as blurred along one side as the pixels are long, which a fit takes for roughness and sheen.
+    """
     width, height = picture_size(render)
     aspect = render.pixel_aspect_x / render.pixel_aspect_y
-    return (round(width * aspect), height) if aspect >= 1.0 else (width, round(height / aspect))
+    return (width, round(height / aspect)) if aspect >= 1.0 else (round(width * aspect), height)
 
 
 def render_region(render: bpy.types.RenderSettings) -> Region | None:

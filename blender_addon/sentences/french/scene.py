@@ -58,7 +58,7 @@ SCENE = {
     # camera, frame and render settings
     "Camera '{}' has a scale of zero: give it and its parents a scale other than zero.": "La caméra '{}' a une échelle nulle : lui en donner une autre, et à ses parents.",
     "Camera '{}' is sheared by its parents: clear the parent's non-uniform scale.": "La caméra '{}' est cisaillée par ses parents : enlever leur échelle inégale.",
-    "Pixel aspect {}:{}: the reference is stretched from {}x{} to {}x{} square pixels.": "Aspect de pixel {}:{} : la référence est étirée de {}x{} à {}x{} pixels carrés.",
+    "Pixel aspect {}:{}: the reference is averaged from {}x{} to {}x{} square pixels.": "Aspect de pixel {}:{} : la référence est moyennée, de {}x{} à {}x{} pixels carrés.",
     "Camera Cull is on: Cycles leaves objects outside the frame out; the fit has them.": "Camera Cull est actif : Cycles omet les objets hors du cadre ; l'ajustement les a.",
     "Distance Cull is on: Cycles leaves distant objects out; the fit has them.": "Distance Cull est actif : Cycles omet les objets lointains ; l'ajustement les a.",
     "Burn Into Image writes text into the picture; the fit has none.": "Incruster dans l'image écrit du texte dans l'image ; l'ajustement n'en a pas.",

@@ -59,7 +59,7 @@ SCENE = {
     # camera, frame and render settings
     "Camera '{}' has a scale of zero: give it and its parents a scale other than zero.": "Kamera '{}' hat die Skalierung null: ihr und ihren Eltern eine andere geben.",
     "Camera '{}' is sheared by its parents: clear the parent's non-uniform scale.": "Kamera '{}' ist durch ihre Eltern geschert: deren ungleichmäßige Skalierung aufheben.",
-    "Pixel aspect {}:{}: the reference is stretched from {}x{} to {}x{} square pixels.": "Pixelseitenverhältnis {}:{}: die Referenz wird von {}x{} auf {}x{} quadratische Pixel gestreckt.",
+    "Pixel aspect {}:{}: the reference is averaged from {}x{} to {}x{} square pixels.": "Pixelseitenverhältnis {}:{}: die Referenz wird gemittelt, von {}x{} auf {}x{} quadratische Pixel.",
     "Camera Cull is on: Cycles leaves objects outside the frame out; the fit has them.": "Camera Cull ist an: Cycles lässt Objekte außerhalb des Bildes weg; die Anpassung hat sie.",
     "Distance Cull is on: Cycles leaves distant objects out; the fit has them.": "Distance Cull ist an: Cycles lässt ferne Objekte weg; die Anpassung hat sie.",
     "Burn Into Image writes text into the picture; the fit has none.": "Ins Bild einbrennen schreibt Text ins Bild; die Anpassung hat keinen.",

@@ -149,7 +149,7 @@ def test_a_check_renders_what_the_job_shows(scene: Any) -> None:
     assert (render.resolution_x, render.resolution_y, render.use_crop_to_border) == (100, 50, True)
 
 
-@pytest.mark.parametrize(("aspect", "size"), [((2.0, 1.0), (80, 30)), ((1.0, 1.5), (40, 45))])
+@pytest.mark.parametrize(("aspect", "size"), [((2.0, 1.0), (40, 15)), ((1.0, 1.25), (32, 30))])
 def test_a_check_shows_the_frame_of_pixels_that_are_not_square(
     scene: Any, aspect: tuple[float, float], size: tuple[int, int]
 ) -> None:
