@@ -14,7 +14,7 @@ from blender_addon.export.files.exr_file import write_exr
 from blender_addon.export.files.png_file import write_png
 from blender_addon.export.job import ExportError
 
-from ..scenes import add_camera, add_quad, new_material, world_color
+from ..scenes import add_camera, add_mesh, add_quad, emission_material, new_material, world_color
 
 
 @pytest.fixture
@@ -180,6 +180,26 @@ def test_a_pixel_aspect_has_the_reference_averaged(target: Any, export: Any, tmp
     assert len(bpy.data.images) == before
     np.testing.assert_allclose(read(report.folder / "reference.exr")[:, 3, 0], [1.0, 4.0], atol=1e-6)
     assert any(note.startswith("Pixel aspect 2:1") for note in report.notes)
+
+
+def test_an_averaged_reference_is_as_sharp_as_a_render_of_square_pixels(
+    scene: Any, export: Any, render_cycles: Any, tmp_path: Path
+) -> None:
+    """Stretched ones were blurred along one side, which a fit took for roughness."""
+    render = scene.render
+    render.resolution_x, render.resolution_y, render.pixel_aspect_x, scene.cycles.samples = 32, 48, 2.0, 64
+    world_color(scene, 1.0)
+    add_camera("ORTHO", (0, 0, 5), ortho_scale=2.0)
+    corners = [(x + 0.13 * y, y - 0.13 * x, 0.0) for x in (-0.4, 0.5) for y in (-0.5, 0.4)]
+    target = add_mesh("Target", corners, [(0, 2, 3, 1)], new_material("Target"))
+    add_quad("Behind", 3.0, -1.0, emission_material("Bright", (4.0, 4.0, 4.0)))
+    render_cycles()
+    report = export(target, reference=tmp_path / "cycles.exr")
+    found = read(report.folder / "reference.exr")[:, :, :3]
+    size = report.request["image"]["width"], report.request["image"]["height"]
+    render.resolution_x, render.resolution_y, render.pixel_aspect_x = *size, 1.0
+    wanted = render_cycles()
+    assert np.abs(found - wanted).mean() < 0.02
 
 
 def tagged(path: Path, pixels: np.ndarray, **header: Any) -> None:
