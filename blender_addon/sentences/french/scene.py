@@ -205,6 +205,7 @@ SCENE = {
     "Of the mix '{}' alone is fitted: {}.": "Du mélange, seul '{}' est ajusté : {}.",
     "Shares of the target's shaders: {}; {}.": "Parts des shaders de l'objet : {} ; {}.",
     "Slot {} of '{}' (material '{}') is named twice: name it once.": "Le slot {} de '{}' (matériau '{}') est nommé deux fois : le nommer une fois.",
+    "Slot {} of '{}' has no material: put '{}' there, which its nodes set.": "Le slot {} de '{}' n'a pas de matériau : y mettre '{}', que ses nœuds attribuent.",
     "Slot {} of '{}' has no material: give it one with a Principled BSDF.": "Le slot {} de '{}' n'a pas de matériau : lui en donner un avec un Principled BSDF.",
     "The group '{}' of material '{}' is used elsewhere too: an apply gives the material a copy of its own.": "Le groupe '{}' du matériau '{}' est utilisé ailleurs aussi : une application donne au matériau sa propre copie.",
     "The group '{}' is used elsewhere too: material '{}' got a copy of its own.": "Le groupe '{}' est utilisé ailleurs aussi : le matériau '{}' a reçu sa propre copie.",

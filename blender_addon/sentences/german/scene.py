@@ -206,6 +206,7 @@ SCENE = {
     "Of the mix '{}' alone is fitted: {}.": "Von der Mischung wird nur '{}' angepasst: {}.",
     "Shares of the target's shaders: {}; {}.": "Anteile der Shader des Materials: {}; {}.",
     "Slot {} of '{}' (material '{}') is named twice: name it once.": "Slot {} von '{}' (Material '{}') ist zweimal genannt: ihn einmal nennen.",
+    "Slot {} of '{}' has no material: put '{}' there, which its nodes set.": "Slot {} von '{}' hat kein Material: '{}' hineinlegen, das seine Nodes setzen.",
     "Slot {} of '{}' has no material: give it one with a Principled BSDF.": "Slot {} von '{}' hat kein Material: ihm eines mit einem Principled BSDF geben.",
     "The group '{}' of material '{}' is used elsewhere too: an apply gives the material a copy of its own.": "Die Gruppe '{}' von Material '{}' wird auch anderswo verwendet: Anwenden gibt dem Material eine eigene Kopie.",
     "The group '{}' is used elsewhere too: material '{}' got a copy of its own.": "Die Gruppe '{}' wird auch anderswo verwendet: Material '{}' bekam eine eigene Kopie.",
