@@ -66,7 +66,8 @@ class Target:
             bpy.context.window.scene, bpy.context.window.view_layer = scene, layer
         if request.get("view"):
             _show(scene, request["view"])
-        obj = shown_object(request["object"], scene, layer)
+        if (obj := shown_object(request["object"], scene, layer)) is None:
+            raise KeyError(request["object"])
         shown = request.get("view") or request
         region = Region(*shown["region"]) if shown.get("region") else None
         origin = np.array(shown.get("origin") or (0.0, 0.0, 0.0))

@@ -27,6 +27,7 @@ _WITH = {
 PLAIN = {"coat_tint": BLENDER_PRINCIPLED["coat_tint"].default}  # what shows nothing; of all others it is 0
 # Those of them that no other class of material brings (job/run/material_classes.py): a user has to give them a value
 ASKED_FOR = ("anisotropic", "subsurface_weight")
+LAYERS_OF_ONE = ("coat_weight", "sheen_weight")  # of other shaders of a mix they are fitted where there are any
 # Without an amount of the second the first has no effect
 AMOUNT_OF = {
     "coat_roughness": "coat_weight",
