@@ -136,6 +136,7 @@ def _results(chosen: argparse.Namespace) -> tuple[list[Path], list[str]]:
 
 def _put_values(bpy: Any, chosen: argparse.Namespace, folder: Path) -> tuple[Any, Any, dict[str, Any], list[str]]:
     """Apply the result in a folder; returns the material, the result, its values by socket and what was skipped."""
+    from .export.render_state import shown_object
     from .result.job_result import JobResultError, read_job_result
     from .result.local_copy import LocalCopyError, make_local, unwritable
     from .result.write_back import WriteBackError, apply_values, result_to_sockets
@@ -143,7 +144,7 @@ def _put_values(bpy: Any, chosen: argparse.Namespace, folder: Path) -> tuple[Any
     try:
         result = read_job_result(folder)
         name = chosen.material or result.material_name
-        obj = bpy.context.scene.objects.get(result.object_name)
+        obj = shown_object(result.object_name, bpy.context.scene, bpy.context.view_layer)
         if obj is not None and chosen.make_local:
             slots = [each.material for each in obj.material_slots]
             slot = next((n for n, each in enumerate(slots) if each and each.name == name), obj.active_material_index)

@@ -39,7 +39,9 @@ def fitted_slots(bpy: Any, chosen: argparse.Namespace) -> list[Any]:
 
 
 def _object(bpy: Any, chosen: argparse.Namespace, name: str) -> Any:
-    obj = bpy.context.scene.objects.get(name)
+    from .export.render_state import shown_object
+
+    obj = shown_object(name, bpy.context.scene, bpy.context.view_layer)
     if obj is None:
         names = ", ".join(o.name for o in bpy.context.scene.objects if o.type == "MESH") or "none"
         elsewhere = [scene.name for scene in bpy.data.scenes if name in scene.objects]

@@ -119,6 +119,17 @@ def instanced_objects(view_layer: bpy.types.ViewLayer) -> set[str]:
     return names
 
 
+def shown_object(name: str, scene: bpy.types.Scene, view_layer: bpy.types.ViewLayer) -> bpy.types.Object | None:
+    """The object of that name in the scene, or in a collection that is shown by its instances alone.
+
+    A collection that is appended as an instance, as the asset browser does it, is in no scene.
+    """
+    if (obj := scene.objects.get(name)) is not None:
+        return obj
+    instanced = instanced_objects(view_layer)
+    return next((each for each in bpy.data.objects if each.name == name and each.name_full in instanced), None)
+
+
 def without_modifiers(view_layer: bpy.types.ViewLayer) -> set[str]:
     """Return the names of the objects that Cycles takes without their modifiers where particles are of them.
 

@@ -24,6 +24,7 @@ from ..export.reference.counted_part import CountedPart
 from ..export.reference.picture_setup import PictureSetup
 from ..export.reference.reference import Picture
 from ..export.reference.reference_view import REFERENCE_VIEWS
+from ..export.render_state import shown_object
 from ..export.steps import Steps
 from ..graph_values.mix_values import inside_values
 from ..process.backend_python import BackendPythonError
@@ -197,7 +198,7 @@ def python_of(context: bpy.types.Context) -> Path:
 def target_of(context: bpy.types.Context, name: str) -> bpy.types.Object:
     """The object of that name, or the active one; raises `FitError` where there is none."""
     if name:
-        obj = context.scene.objects.get(name)
+        obj = shown_object(name, context.scene, context.view_layer)
         if obj is None:
             raise FitError(
                 f"The scene {context.scene.name!r} has no object {name!r}: give the name of one of its objects."

@@ -21,7 +21,7 @@ from ..export.nodes.dependence import OF_FACING, asked_for
 from ..export.nodes.displacement import SHADING_NORMAL, bends_normals, moves_faces
 from ..export.nodes.leaf_kinds import TRANSPARENT
 from ..export.nodes.shader_graph import source_of
-from ..export.render_state import render_state
+from ..export.render_state import render_state, shown_object
 from ..versions import active_output
 from .aov_render import Bounds, Frame, bounds_of, frame_of, render_outputs, whole_frame
 from .closure_tree import ClosureTree, Leaf, within_bounds
@@ -66,7 +66,8 @@ class Target:
             bpy.context.window.scene, bpy.context.window.view_layer = scene, layer
         if request.get("view"):
             _show(scene, request["view"])
-        obj = scene.objects[request["object"]]
+        if (obj := shown_object(request["object"], scene, layer)) is None:
+            raise KeyError(request["object"])
         shown = request.get("view") or request
         region = Region(*shown["region"]) if shown.get("region") else None
         origin = np.array(shown.get("origin") or (0.0, 0.0, 0.0))

@@ -40,6 +40,15 @@ def flat_camera(scene: Any, target: Any) -> None:
     scene.camera.scale = (1.0, 0.0, 1.0)
 
 
+def slot_by_nodes(scene: Any, target: Any) -> None:
+    """Nodes, in a group, give the faces the material that the slot had."""
+    inner, tree = (bpy.data.node_groups.new(name, "GeometryNodeTree") for name in ("Inner", "Scatter"))
+    inner.nodes.new("GeometryNodeSetMaterial").inputs["Material"].default_value = target.active_material
+    tree.nodes.new("GeometryNodeGroup").node_tree = inner
+    target.modifiers.new("Scatter", "NODES").node_group = tree
+    target.data.materials.clear()
+
+
 def no_slot(scene: Any, target: Any) -> None:
     target.data.materials.clear()
 
@@ -170,6 +179,7 @@ CASES: dict[Callable[[Any, Any], None], str] = {
     empty_region: "The Render Region holds no pixel: turn Render Region off.",
     flat_camera: "Camera 'Camera' has a scale of zero: give it and its parents a scale other than zero.",
     no_slot: "Slot 1 of 'Target' has no material: give it one with a Principled BSDF.",
+    slot_by_nodes: "Slot 1 of 'Target' has no material: put 'Target' there, which its nodes set.",
     empty_slot: "Slot 1 of 'Target' has no material: give it one with a Principled BSDF.",
     no_principled: "Material 'Plain' shows Emission alone, which reflects no light: link a Principled BSDF, directly, "
     "in a group or in a mix.",

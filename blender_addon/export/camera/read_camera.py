@@ -27,7 +27,7 @@ def read_camera(
     square_width, square_height = square_size(render)
     if (square_width, square_height) != (width, height):
         findings.note(
-            f"Pixel aspect {render.pixel_aspect_x:g}:{render.pixel_aspect_y:g}: the reference is stretched from "
+            f"Pixel aspect {render.pixel_aspect_x:g}:{render.pixel_aspect_y:g}: the reference is averaged from "
             f"{width}x{height} to {square_width}x{square_height} square pixels."
         )
     world = np.array(evaluated.matrix_world, dtype=np.float64)

@@ -7,6 +7,7 @@ from collections.abc import Mapping
 from typing import Any
 
 import bpy
+import numpy as np
 
 from .camera_model import Region
 
@@ -23,23 +24,31 @@ def picture_size(render: bpy.types.RenderSettings) -> Size:
 
 
 def square_size(render: bpy.types.RenderSettings) -> Size:
-    """Return width and height of the frame in square pixels, more of them where pixels are not square."""
+    """Return width and height of the frame in square pixels, fewer of them where pixels are not square.
+
+    More of them would be as blurred along one side as the pixels are long, which a fit takes for roughness and sheen.
+    """
     width, height = picture_size(render)
     aspect = render.pixel_aspect_x / render.pixel_aspect_y
-    return (round(width * aspect), height) if aspect >= 1.0 else (width, round(height / aspect))
+    return (width, round(height / aspect)) if aspect >= 1.0 else (round(width * aspect), height)
 
 
 def render_region(render: bpy.types.RenderSettings) -> Region | None:
     """The Render Region in pixels of the frame, None where it is off; one without pixels is possible.
 
     Blender cuts off what is below a whole pixel, with and without *Crop to Render Region*: so in 135 of 135 pictures
-    of random regions by 4.3, 5.0 and 5.2.
+    of random regions by 4.3, 5.0 and 5.2. It multiplies in single precision, where 95 % of 160 pixels are 152.
     """
     if not render.use_border:
         return None
     width, height = picture_size(render)
-    left, right = int(render.border_min_x * width), int(render.border_max_x * width)
-    return Region(left, height - int(render.border_max_y * height), right, height - int(render.border_min_y * height))
+    left, right = _pixels(render.border_min_x, width), _pixels(render.border_max_x, width)
+    bottom, top = _pixels(render.border_min_y, height), _pixels(render.border_max_y, height)
+    return Region(left, height - top, right, height - bottom)
+
+
+def _pixels(part: float, of: int) -> int:
+    return int(np.float32(part) * np.float32(of))
 
 
 def pictured_region(render: bpy.types.RenderSettings, picture: Size | None = None) -> Region | None:

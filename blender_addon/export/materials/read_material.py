@@ -59,8 +59,11 @@ def read_target(
 ) -> Material | None:
     """Return the material to fit, or None with an error in `findings`; `leaf` names the one of a mix to fit."""
     if material is None:
-        findings.error(f"Slot {slot + 1} of '{owner}' has no material: give it one with a Principled BSDF.",
-                       Fix("new_material"))  # fmt: skip
+        if shown := _set_by_nodes(owner):
+            findings.error(f"Slot {slot + 1} of '{owner}' has no material: put '{shown}' there, which its nodes set.")
+        else:
+            findings.error(f"Slot {slot + 1} of '{owner}' has no material: give it one with a Principled BSDF.",
+                           Fix("new_material"))  # fmt: skip
         return None
     target = target_shader(material, leaf)
     if target is None:
@@ -248,6 +251,27 @@ def _read_fitted(material: bpy.types.Material, target: TargetShader, findings: F
     found = Material(material.name, "principled", sockets, target.node.distribution, walks_of(target.node))
     found.transparent_shadows = material.use_transparent_shadow
     return found
+
+
+def _set_by_nodes(owner: str) -> str:
+    """A material that Geometry Nodes of an object set, by name; empty without one.
+
+    What is in a slot as well is found on their faces, too.
+    """
+    modifiers = bpy.data.objects[owner].modifiers if owner in bpy.data.objects else ()
+    todo = [each.node_group for each in modifiers if each.type == "NODES" and each.node_group is not None]
+    seen: set[str] = set()
+    while todo:
+        tree = todo.pop()
+        if tree.name_full in seen:
+            continue
+        seen.add(tree.name_full)
+        for node in tree.nodes:
+            inner, material = getattr(node, "node_tree", None), node.inputs.get("Material")
+            todo += [inner] if inner is not None else []
+            if node.bl_idname == "GeometryNodeSetMaterial" and material.default_value is not None:
+                return material.default_value.name
+    return ""
 
 
 def with_default_tangent(material: Material, *, is_fitted: bool = False) -> Material:

@@ -81,11 +81,11 @@ def read_reference(
     upright: bool = False,
     alpha: bool = False,
 ) -> Reference | None:
-    """Return the reference for a picture of `size` (width, height), stretched if the scene's pixels are not square.
+    """Return the reference for a picture of `size` (width, height), averaged if the scene's pixels are not square.
 
     `made` is one of `REFERENCE_VIEWS`. A display picture that was rendered in this scene comes with a table of the
     scene's view where no formula undoes that. `upright` turns a picture as its EXIF data say; else it is as stored.
-    `alpha` keeps the alpha channel of one that is written anew.
+    `alpha` keeps the alpha channel of one that is written anew, as it is kept of display colours that are straight.
 
     Raises
     ------
@@ -98,8 +98,8 @@ def read_reference(
         reference.check()
         found = read_reference(reference.picture, scene, size, made=made, upright=upright, alpha=reference.alpha)
         return replace(found, part=reference) if found is not None else None
-    stretched = scene.render.pixel_aspect_x != scene.render.pixel_aspect_y
-    rendered = picture_size(scene.render) if stretched else size
+    is_averaged = scene.render.pixel_aspect_x != scene.render.pixel_aspect_y
+    rendered = picture_size(scene.render) if is_averaged else size
     of_region = rendered != picture_size(scene.render)
     if isinstance(reference, bpy.types.Image):
         found = _from_image(reference, scene, size, rendered, made, alpha=alpha)
@@ -109,7 +109,7 @@ def read_reference(
     turn = header.orientation if upright else 1
     said = () if upright else turn_notes(path.name, header, rendered, f"reference{suffix}")
     is_linear = suffix in LINEAR_SUFFIXES
-    if stretched or turn != 1:
+    if is_averaged or turn != 1:
         image = bpy.data.images.load(str(path), check_existing=False)
         try:
             if suffix == ".exr":
@@ -166,14 +166,16 @@ def _from_image(
     alpha: bool,
 ) -> Reference:
     try:
-        pixels = np.ascontiguousarray(read_pixels(image)[:, :, : 4 if alpha else 3])
+        pixels = read_pixels(image)
     except UnreadableImageError as problem:
         raise ExportError(f"The reference '{image.name}' {problem}.") from None
-    pixels = turned(pixels, turn)
+    if holds_display_colours(image) and image.alpha_mode in ("STRAIGHT", "PREMUL"):  # Blender divides bytes
+        alpha |= bool((pixels[:, :, 3] < 1.0).any())
+    pixels = turned(np.ascontiguousarray(pixels[:, :, : 4 if alpha else 3]), turn)
     height, width = pixels.shape[:2]
     refuse_size(image.name, (width, height), rendered, of_region=rendered != picture_size(scene.render))
     if rendered != size:
-        pixels = _stretch(pixels, size)
+        pixels = _averaged(pixels, size)
     if not holds_display_colours(image):
         return Reference("reference.exr", "linear", pixels=pixels)
     encoded = np.where(pixels <= 0.0031308, 12.92 * pixels, 1.055 * np.maximum(pixels, 1e-9) ** (1 / 2.4) - 0.055)
@@ -189,18 +191,13 @@ def _view(scene: bpy.types.Scene, name: str, made: str) -> dict[str, Any]:
     return {"view": view, "notes": (said,) if said else ()}
 
 
-def _stretch(pixels: NDArray[np.float32], size: tuple[int, int]) -> NDArray[np.float32]:
-    """Resample to `size` (width, height) with linear interpolation between pixel centres."""
+def _averaged(pixels: NDArray[np.float32], size: tuple[int, int]) -> NDArray[np.float32]:
+    """The mean of what each of `size` (width, height) larger pixels covers."""
     for axis, count in ((1, size[0]), (0, size[1])):
         old = pixels.shape[axis]
         if old == count:
             continue
-        place = np.clip((np.arange(count) + 0.5) * old / count - 0.5, 0, old - 1)
-        low = np.minimum(place.astype(int), max(old - 2, 0))
-        weight = (place - low).astype(np.float32)
-        shape = [1, 1, 1]
-        shape[axis] = count
-        weight = weight.reshape(shape)
-        high = np.minimum(low + 1, old - 1)
-        pixels = np.take(pixels, low, axis) * (1 - weight) + np.take(pixels, high, axis) * weight
+        covered = [np.clip(np.arange(1, old + 1) - edge, 0.0, 1.0) for edge in np.arange(count + 1) * old / count]
+        weights = -np.diff(covered, axis=0) * count / old  # (count, old)
+        pixels = np.moveaxis(np.tensordot(weights, pixels, (1, axis)), 0, axis)
     return np.ascontiguousarray(pixels, dtype=np.float32)

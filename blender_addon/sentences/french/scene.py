@@ -58,7 +58,7 @@ SCENE = {
     # camera, frame and render settings
     "Camera '{}' has a scale of zero: give it and its parents a scale other than zero.": "La caméra '{}' a une échelle nulle : lui en donner une autre, et à ses parents.",
     "Camera '{}' is sheared by its parents: clear the parent's non-uniform scale.": "La caméra '{}' est cisaillée par ses parents : enlever leur échelle inégale.",
-    "Pixel aspect {}:{}: the reference is stretched from {}x{} to {}x{} square pixels.": "Aspect de pixel {}:{} : la référence est étirée de {}x{} à {}x{} pixels carrés.",
+    "Pixel aspect {}:{}: the reference is averaged from {}x{} to {}x{} square pixels.": "Aspect de pixel {}:{} : la référence est moyennée, de {}x{} à {}x{} pixels carrés.",
     "Camera Cull is on: Cycles leaves objects outside the frame out; the fit has them.": "Camera Cull est actif : Cycles omet les objets hors du cadre ; l'ajustement les a.",
     "Distance Cull is on: Cycles leaves distant objects out; the fit has them.": "Distance Cull est actif : Cycles omet les objets lointains ; l'ajustement les a.",
     "Burn Into Image writes text into the picture; the fit has none.": "Incruster dans l'image écrit du texte dans l'image ; l'ajustement n'en a pas.",
@@ -205,6 +205,7 @@ SCENE = {
     "Of the mix '{}' alone is fitted: {}.": "Du mélange, seul '{}' est ajusté : {}.",
     "Shares of the target's shaders: {}; {}.": "Parts des shaders de l'objet : {} ; {}.",
     "Slot {} of '{}' (material '{}') is named twice: name it once.": "Le slot {} de '{}' (matériau '{}') est nommé deux fois : le nommer une fois.",
+    "Slot {} of '{}' has no material: put '{}' there, which its nodes set.": "Le slot {} de '{}' n'a pas de matériau : y mettre '{}', que ses nœuds attribuent.",
     "Slot {} of '{}' has no material: give it one with a Principled BSDF.": "Le slot {} de '{}' n'a pas de matériau : lui en donner un avec un Principled BSDF.",
     "The group '{}' of material '{}' is used elsewhere too: an apply gives the material a copy of its own.": "Le groupe '{}' du matériau '{}' est utilisé ailleurs aussi : une application donne au matériau sa propre copie.",
     "The group '{}' is used elsewhere too: material '{}' got a copy of its own.": "Le groupe '{}' est utilisé ailleurs aussi : le matériau '{}' a reçu sa propre copie.",

@@ -59,7 +59,7 @@ SCENE = {
     # camera, frame and render settings
     "Camera '{}' has a scale of zero: give it and its parents a scale other than zero.": "Kamera '{}' hat die Skalierung null: ihr und ihren Eltern eine andere geben.",
     "Camera '{}' is sheared by its parents: clear the parent's non-uniform scale.": "Kamera '{}' ist durch ihre Eltern geschert: deren ungleichmäßige Skalierung aufheben.",
-    "Pixel aspect {}:{}: the reference is stretched from {}x{} to {}x{} square pixels.": "Pixelseitenverhältnis {}:{}: die Referenz wird von {}x{} auf {}x{} quadratische Pixel gestreckt.",
+    "Pixel aspect {}:{}: the reference is averaged from {}x{} to {}x{} square pixels.": "Pixelseitenverhältnis {}:{}: die Referenz wird gemittelt, von {}x{} auf {}x{} quadratische Pixel.",
     "Camera Cull is on: Cycles leaves objects outside the frame out; the fit has them.": "Camera Cull ist an: Cycles lässt Objekte außerhalb des Bildes weg; die Anpassung hat sie.",
     "Distance Cull is on: Cycles leaves distant objects out; the fit has them.": "Distance Cull ist an: Cycles lässt ferne Objekte weg; die Anpassung hat sie.",
     "Burn Into Image writes text into the picture; the fit has none.": "Ins Bild einbrennen schreibt Text ins Bild; die Anpassung hat keinen.",
@@ -206,6 +206,7 @@ SCENE = {
     "Of the mix '{}' alone is fitted: {}.": "Von der Mischung wird nur '{}' angepasst: {}.",
     "Shares of the target's shaders: {}; {}.": "Anteile der Shader des Materials: {}; {}.",
     "Slot {} of '{}' (material '{}') is named twice: name it once.": "Slot {} von '{}' (Material '{}') ist zweimal genannt: ihn einmal nennen.",
+    "Slot {} of '{}' has no material: put '{}' there, which its nodes set.": "Slot {} von '{}' hat kein Material: '{}' hineinlegen, das seine Nodes setzen.",
     "Slot {} of '{}' has no material: give it one with a Principled BSDF.": "Slot {} von '{}' hat kein Material: ihm eines mit einem Principled BSDF geben.",
     "The group '{}' of material '{}' is used elsewhere too: an apply gives the material a copy of its own.": "Die Gruppe '{}' von Material '{}' wird auch anderswo verwendet: Anwenden gibt dem Material eine eigene Kopie.",
     "The group '{}' is used elsewhere too: material '{}' got a copy of its own.": "Die Gruppe '{}' wird auch anderswo verwendet: Material '{}' bekam eine eigene Kopie.",

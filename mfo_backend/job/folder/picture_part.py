@@ -31,6 +31,10 @@ COUNTED = "{share} of the reference's pixels count ({why}); the others have no p
 MASK_SCALED = "The mask is {mask} pixels and the reference {picture}: it was scaled to that."
 NOTHING_LEFT = "Nothing of the reference is left ({why}): give a part that holds some of the object."
 ALL_OF_FRAME = "Render Region is on, and the reference shows more than the region: all of it counts."
+HALF_CLEAR = (
+    "Half-clear pixels of the reference ({share}) have no part in the fit: a display picture has their colours without "
+    "what is behind them."
+)
 NO_ALPHA = "The reference has no alpha channel, so all of it counts."
 
 
@@ -107,7 +111,8 @@ def with_part(image: Image, part: PicturePart, folder: JobFolder) -> tuple[Image
     BadInputError
         If the mask cannot be read, or nothing is left.
     """
-    if part.is_whole:
+    half_clear = _half_clear(image)
+    if part.is_whole and not half_clear.any():
         return image, ()
     notes: list[str] = []
     counts = _inside(part.crop, image)
@@ -128,10 +133,25 @@ def with_part(image: Image, part: PicturePart, folder: JobFolder) -> tuple[Image
         notes.append(NO_ALPHA)
     if not counts.any():
         raise BadInputError(NOTHING_LEFT.format(why=part.words))
+    if not counts.all():
+        notes.append(COUNTED.format(share=_per_cent(counts), why=part.words))
+    if (lost := counts & half_clear).any() and (counts & ~half_clear).any():
+        notes.append(HALF_CLEAR.format(share=_per_cent(lost)))
+        counts &= ~half_clear
     if counts.all():
         return image, tuple(notes)
-    notes.append(COUNTED.format(share=f"{100.0 * counts.mean():.3g} %", why=part.words))
     return replace(image, counts=counts), tuple(notes)
+
+
+def _per_cent(pixels: NDArray[np.bool_]) -> str:
+    return f"{100.0 * pixels.mean():.3g} %"
+
+
+def _half_clear(image: Image) -> NDArray[np.bool_]:
+    """Where a display picture, whose colours are not multiplied by alpha, shows two things; an EXR's are."""
+    if image.alpha is None or image.encoding is Encoding.LINEAR:
+        return np.zeros((image.height, image.width), bool)
+    return (image.alpha > 0.0) & (image.alpha < OPAQUE)
 
 
 def _inside(crop: tuple[float, float, float, float], image: Image) -> NDArray[np.bool_]:

@@ -23,11 +23,11 @@ from .material_classes import (
     PLAINER_GLOW,
     MaterialClass,
     doubted,
+    either,
     is_better,
     is_plainer,
     look_alike,
     tried_notes,
-    value_of,
     with_values_of,
 )
 
@@ -58,6 +58,8 @@ def with_other_classes(
     for other in classes:
         if not is_wanted(fitted):
             break
+        if not other.may_explain(fitted.result.judgement):
+            continue
         try:
             again = fit_from(other)
         except UnrecordableError:
@@ -152,7 +154,7 @@ def _taken(first: Fitted, again: Fitted, other: MaterialClass, material: Mapping
     before, after = first.result, with_values_of(other, again.result, material)
     result = replace(
         after,
-        initial={name: before.initial.get(name, value_of(material, name)) for name in after.recovered},
+        initial={**before.initial, **{name: either(before.initial, material, name) for name in after.recovered}},
         errors={name: (before.errors[name][0], error) for name, (_, error) in after.errors.items()},
         notes=(*after.notes, note),
         seconds=before.seconds + after.seconds,

@@ -250,8 +250,8 @@ def _fit_and_other_classes(job: _OneMaterial) -> tuple[Fitted, tuple[str, ...]]:
     visible = np.inf if before is None else before.target.visible
 
     def fit_from(other: MaterialClass, nearer_than: float) -> Fitted:
-        # values inside nodes are those of the material in the scene
-        again = job.load(parameters_of(other, names), (), lambda material: changed(material, other))
+        graphs = job.graphs if other.further and refused is None else ()
+        again = job.load(parameters_of(other, names), graphs, lambda material: changed(material, other))
         return job.fit(again, nearer_than=nearer_than)
 
     def is_wanted(found: Fitted) -> bool:

@@ -5,7 +5,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from ...material.principled.blender_selection import ASKED_FOR
+from ...material.principled.blender_selection import ASKED_FOR, LAYERS_OF_ONE
 from ...material.principled.principled_dict import DIRECTIONS
 from ...material.principled.principled_parameters import SOCKET_OF_PARAMETER
 from ...types.result import FitResult
@@ -97,6 +97,9 @@ def absent_notes(request: Request, result: FitResult) -> tuple[str, ...]:
         return ()
     names = [SOCKET_OF_PARAMETER[name] for name in ASKED_FOR if name not in result.recovered]
     own = {name: material.sockets[name] for name in names if name in material.sockets}
+    for leaf in material.leaves:  # a fit of `all` gives these to the fitted one alone
+        layers = [SOCKET_OF_PARAMETER[name] for name in LAYERS_OF_ONE if leaf.free]
+        own |= {f"{leaf.name}/{name}": leaf.sockets[name] for name in layers if name in leaf.sockets}
     absent = [name for name, socket in own.items() if socket.value == 0.0 and not socket.linked]
     return (_NONE_OF_IT.format(names=", ".join(absent)),) if absent else ()
 

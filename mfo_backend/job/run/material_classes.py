@@ -15,13 +15,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ...material.principled.blender_selection import AMOUNT_OF
+from ...material.principled.blender_selection import AMOUNT_OF, PLAIN
 from ...material.principled.principled_dict import socket_value
 from ...material.principled.principled_parameters import BLENDER_PRINCIPLED, PARAMETER_OF_SOCKET, SOCKET_OF_PARAMETER
 from ...metrics.display.tone_mapping import View
 from ...types.certainty import Level
 from ...types.image import Encoding, Image
-from ...types.parameter import Value
+from ...types.parameter import Parameter, ParameterTable, Value
 from ...types.result import FitResult
 from ...types.verdict import Cause, Judgement, Verdict
 
@@ -29,6 +29,9 @@ from ...types.verdict import Cause, Judgement, Verdict
 GLASS = {"Transmission Weight": 1.0, "Metallic": 0.0, "Alpha": 1.0, "Roughness": 0.1, "Base Color": [0.9, 0.9, 0.9]}
 CUT_OUT = {"Alpha": 0.5, "Transmission Weight": 0.0}
 OPAQUE = {"Transmission Weight": 0.0, "Alpha": 1.0}
+TINTED = OPAQUE | {"Coat Weight": 0.5, "Coat Tint": [0.5, 0.5, 0.5]}
+FILMED = OPAQUE | {"Thin Film Thickness": 400.0}  # nanometres, where the first colours are
+CLAY = OPAQUE | {"Diffuse Roughness": 0.5}
 GLOWING = OPAQUE | {"Emission Color": [0.5, 0.5, 0.5]}
 _OF_GLASS = ("transmission_weight", "ior")
 # A glow adds to every pixel, so none is darker but by noise; of the median of the target, which may be clipped
@@ -50,7 +53,8 @@ class MaterialClass:
     """A class with the values it begins with, and what a user is told.
 
     A fit of it changes what `all` stands for, or with `also` that, but never what is named so. A class that `glows` is
-    believed only where its light is found on the surroundings, too.
+    believed only where its light is found on the surroundings, too. One with `further` lobes is of the
+    scene's kind, so that values inside nodes are fitted, too; else they are those of the scene's material.
     """
 
     name: str
@@ -58,6 +62,11 @@ class MaterialClass:
     also: tuple[str, ...] = ()
     never: tuple[str, ...] = ()
     glows: bool = False
+    further: bool = False
+
+    def may_explain(self, judgement: Judgement | None) -> bool:
+        """Whether it may be what a result lacks: further lobes cast no other shadow, and no light."""
+        return not self.further or judgement is None or judgement.cause not in _AROUND
 
     @property
     def note(self) -> str:
@@ -83,6 +92,14 @@ def _or(classes: Sequence[MaterialClass]) -> str:
     return " or ".join(other.name for other in classes)
 
 
+# What an opaque material may have more of, by the value that is without effect in the scene
+_FURTHER = {
+    "coat_tint": MaterialClass("under a tinted coat", TINTED, ("coat_tint",), _OF_GLASS, further=True),
+    "thin_film_thickness": MaterialClass(
+        "under a thin film", FILMED, ("thin_film_thickness", "thin_film_ior"), _OF_GLASS, further=True
+    ),
+    "diffuse_roughness": MaterialClass("as rough as clay", CLAY, ("diffuse_roughness",), _OF_GLASS, further=True),
+}
 _CLASSES = (
     MaterialClass("of glass", GLASS),
     MaterialClass("cut out", CUT_OUT, ("alpha",), _OF_GLASS),
@@ -112,14 +129,16 @@ def other_classes(material: Mapping[str, Any], glow: float) -> list[MaterialClas
     shaders.
 
     Its own comes first if that changes more than a fit of `all` does. Then comes the one that glows, for its fit is the
-    quickest; its emission is at most of the radiance `glow`.
+    quickest; its emission is at most of the radiance `glow`. An opaque one may lack a lobe.
     """
     sockets = material["sockets"]
     if material.get("leaves"):
         return []
     own = _class_of(sockets)
-    glowing = (_glowing(material, glow),) if glow > 0.0 else ()
-    classes = sorted((*glowing, *_CLASSES), key=lambda other: other.name != own)
+    quick = [_glowing(material, glow)] if glow > 0.0 else []
+    if own == "opaque":
+        quick += [further for name, further in _FURTHER.items() if value_of(material, name) == PLAIN.get(name, 0.0)]
+    classes = sorted((*quick, *_CLASSES), key=lambda other: other.name != own)
     return [
         other for other in classes
         if (other.name != own or other.also)
@@ -189,7 +208,8 @@ def with_values_of(other: MaterialClass, result: FitResult, material: Mapping[st
         if (sure := certainty.get("emission_color")) is not None:
             certainty["emission_color"] = replace(sure, sd=tuple(sd / peak for sd in sure.sd))
             certainty["emission_strength"] = replace(sure, sd=(strength * max(sure.sd),))
-    bounds = {name: (BLENDER_PRINCIPLED[name].lower, BLENDER_PRINCIPLED[name].upper) for name in values}
+    own = [BLENDER_PRINCIPLED[name] for name in values if name in SOCKET_OF_PARAMETER]
+    bounds = {p.name: (p.lower, p.upper) for p in own}
     return replace(result, recovered=values, certainty=certainty, bounds=bounds | dict(result.bounds))
 
 
@@ -203,14 +223,26 @@ def doubted(result: FitResult, other: FitResult, material: Mapping[str, Any]) ->
 
     if not result.certainty:
         return result
-    table = BLENDER_PRINCIPLED.select(result.certainty)
-    near = {name: other.recovered.get(name, value_of(material, name)) for name in table.names}
+    table = ParameterTable(_parameter(name, result) for name in result.certainty)
+    near = {name: either({**other.initial, **other.recovered}, material, name) for name in table.names}
     away = table.pack(result.recovered) - table.pack(near)
     found = certainties_away(result.certainty, away, table)
     for name, certainty in found.items():
         if certainty.level is Level.NOT_VISIBLE and np.any(away[table.slice_of(name)]):
             found[name] = replace(certainty, level=Level.NOT_TOLD_APART)
     return replace(result, certainty=found)
+
+
+def _parameter(name: str, result: FitResult) -> Parameter:
+    if name in SOCKET_OF_PARAMETER:
+        return BLENDER_PRINCIPLED[name]
+    value = result.recovered[name]  # inside nodes
+    return Parameter(name, np.size(value), *result.bounds[name], default=value)
+
+
+def either(values: Mapping[str, Value], material: Mapping[str, Any], name: str) -> Value:
+    """A value where `values` have it, else as the material has it."""
+    return values[name] if name in values else value_of(material, name)
 
 
 def look_alike(first: Judgement, second: Judgement) -> bool:

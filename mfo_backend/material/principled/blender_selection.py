@@ -10,20 +10,24 @@ from ...types.parameter import ParameterTable
 from .principled_parameters import BLENDER_PRINCIPLED
 
 REDUCED = ("base_color", "metallic", "roughness", "specular_ior_level")  # the paper's scenario "Parameters"
-# Of an opaque surface one picture cannot tell IOR from Specular IOR Level, nor the coat's IOR and tint from its weight;
-# transmission, film, anisotropy and diffuse roughness join when the material has them already, and so does the radius
-# of subsurface: its scale multiplies that, and a smaller weight looks like shorter ways (docs/notebook/subsurface.md).
+# Of an opaque surface one picture cannot tell IOR from Specular IOR Level, nor the coat's IOR from its weight;
+# transmission, film, anisotropy, diffuse roughness and a coat's tint join when the material has them already, and so
+# does the radius of subsurface: its scale multiplies that, and a smaller weight looks like shorter ways
+# (docs/notebook/subsurface.md).
 OPAQUE = (*REDUCED, "specular_tint", "coat_weight", "coat_roughness", "sheen_weight", "sheen_roughness", "sheen_tint")
 _WITH = {
     "transmission_weight": ("transmission_weight", "ior"),
     "anisotropic": ("anisotropic", "anisotropic_rotation"),
     "thin_film_thickness": ("thin_film_thickness", "thin_film_ior"),
     "diffuse_roughness": ("diffuse_roughness",),
+    "coat_tint": ("coat_tint",),
     "subsurface_weight": ("subsurface_radius",),
     "absorption_density": ("absorption_density", "absorption_color"),
 }
+PLAIN = {"coat_tint": BLENDER_PRINCIPLED["coat_tint"].default}  # what shows nothing; of all others it is 0
 # Those of them that no other class of material brings (job/run/material_classes.py): a user has to give them a value
-ASKED_FOR = ("anisotropic", "thin_film_thickness", "diffuse_roughness", "subsurface_weight")
+ASKED_FOR = ("anisotropic", "subsurface_weight")
+LAYERS_OF_ONE = ("coat_weight", "sheen_weight")  # of other shaders of a mix they are fitted where there are any
 # Without an amount of the second the first has no effect
 AMOUNT_OF = {
     "coat_roughness": "coat_weight",
@@ -59,7 +63,7 @@ def select_blender_parameters(
     selection
         ``"all"``, ``"reduced"`` (base colour, metallic, roughness, specular level) or names.
     present
-        Names whose weight the material sets to something other than 0.
+        Names that the material sets to something other than what shows nothing (`PLAIN`).
     linked
         Names that a texture feeds; they stay fixed. Of an emission whose colour is one of them the strength is free.
 

@@ -13,7 +13,7 @@ from xml.etree import ElementTree
 import numpy as np
 from numpy.typing import NDArray
 
-from ...material.principled.blender_selection import TIMES, select_blender_parameters
+from ...material.principled.blender_selection import PLAIN, TIMES, select_blender_parameters
 from ...material.principled.mix_values import mix_values
 from ...material.principled.principled_dict import (
     blender_principled_dict,
@@ -113,10 +113,10 @@ def _opened(target: Target, selection: str | Sequence[str], materials: Materials
     sockets = materials[target.bsdf_id]["sockets"]
     linked = {PARAMETER_OF_SOCKET[name] for name, socket in sockets.items() if socket.get("linked") and name in SOCKETS}
     held = TIMES if is_mixed(materials[target.bsdf_id]) else ()  # a mix's glow is a picture of all its shaders
-    present = [name for name, value in _constants(sockets).items() if value != 0.0 and name not in held]
+    shown = {name for name, value in _constants(sockets).items() if value != PLAIN.get(name, 0.0)}
     # values inside nodes may be all that is fitted
     nothing = not isinstance(selection, str) and not selection
-    chosen = None if nothing else select_blender_parameters(selection, present=present, linked=linked)
+    chosen = None if nothing else select_blender_parameters(selection, present=shown.difference(held), linked=linked)
     table = ParameterTable(()) if chosen is None else _labelled(chosen, materials[target.bsdf_id])
     table = _near_walks(table, _constants(sockets), WALK_SIZES)
     start = table.clip(table.pack(_constants(sockets)))

@@ -66,11 +66,9 @@ class _Hits:
 
     def of_rays(self, ray: mi.UInt32) -> _Hits:
         """Those of some rays, which may repeat."""
-        si, position, share = (dr.gather(type(a), a, ray) for a in (self.si, self.position, self.share))
-        given = (self.own, self.coat, self.smooth, self.diffuse)
-        own, coat, smooth, diffuse = (None if a is None else dr.gather(type(a), a, ray) for a in given)
-        held = tuple(dr.gather(type(a), a, ray) for a in self.held)
-        return _Hits(si, position, share, held, self.pixels, self.plugin, own, coat, smooth, diffuse, self.through)
+        names = ("si", "position", "share", "own", "coat", "smooth", "diffuse")
+        some = {name: dr.gather(type(a), a, ray) for name in names if (a := getattr(self, name)) is not None}
+        return replace(self, **some, held=tuple(dr.gather(type(a), a, ray) for a in self.held))
 
 
 def record_paths(
@@ -125,18 +123,15 @@ def record_paths(
         own = mi.SurfaceInteraction3f(si) if settings.mixed else None
         if own is not None and below is not None and not walks_free:
             own.duv_dx = mi.Point2f(0.0, 1.0)  # walks take the place of the lobe that stands for them
-        coat, smooth, diffuse = _other_normals(shape, settings, si)
+        normals = _other_normals(shape, settings, si)
         si = _turned(shape, settings, si)
         sampled = settings.depth > 2 or not lights_have_no_extent(scene)
         if settings.depth == 2 or settings.light_paths is None:
             si = _without_parametrisation(si, own_normal=settings.bumped)
         # exact lights alone look at hits once each, and compute them again instead of keeping them
-        dr.eval(
-            si if sampled or settings.mixed else (), own, coat, smooth, diffuse, position, filter_weight, share, held
-        )
+        dr.eval(si if sampled or settings.mixed else (), own, *normals, position, filter_weight, share, held)
         plugin = shape.bsdf() if settings.mixed else None
-        through = settings.proposal.through
-        hits = _Hits(si, position, share, held, len(rays.pixel), plugin, own, coat, smooth, diffuse, through)
+        hits = _Hits(si, position, share, held, len(rays.pixel), plugin, own, *normals, settings.proposal.through)
         exact = [part for part in _delta_lights(scene, hits, shadows) if dr.width(part.position) > 0]
         if radiance is not None:
             nowhere = dr.zeros(mi.Vector3f, dr.width(position))
@@ -259,10 +254,9 @@ def _sampled_lights(
     shadows: ShadowRays,
 ) -> list[TechniqueLanes]:
     """Light samples and proposal samples of the camera rays, weighted by the balance heuristic (Veach 1995)."""
-    everywhere = list(scene.emitters())
-    extended = [i for i, e in enumerate(everywhere) if not mi.has_flag(e.flags(), DELTA)]
+    extended = [i for i, e in enumerate(scene.emitters()) if not mi.has_flag(e.flags(), DELTA)]
     indirect = settings.depth > 2
-    # all samples in one launch: tracing the scene in Python takes longer than to launch it
+    # in one launch: tracing the scene in Python takes longer than to launch it
     count = dr.width(hits.position)
     lane, rays = dr.arange(mi.UInt32, settings.samples * count), dr.opaque(mi.UInt32, count)
     sample = lane // rays
@@ -309,8 +303,7 @@ def _sampled_lights(
     wo = proposal.sample(si.wi, lobe, mi.Point2f(*u), hits.coat, hits.diffuse)
     density = proposal.density(si.wi, wo, hits.coat, hits.diffuse)
     valid = front & hits.lit(wo) & (density > 0.0)
-    if not hits.through:  # else some lobe sends light to either side
-        valid &= leaves_on(scene, si, wo, False)
+    valid &= hits.through or leaves_on(scene, si, wo, False)  # some lobe sends light to either side
     ray = shadows.starts.ray(si, si.to_world(wo))
     met = scene.ray_intersect_preliminary(ray, active=valid)
     far = met.compute_surface_interaction(ray, mi.RayFlags.All, valid)

@@ -158,14 +158,9 @@ class RecordedScene:
         width, height = (int(n) for n in scene.sensors()[0].film().crop_size())
         stride = max(1, math.ceil(math.sqrt(width * height / PROBE_RAYS)))
         share = indirect_share(
-            scene,
-            self.renderer.shape,
-            depth,
-            self.model.two_sided,
-            self.renderer.light_paths,
-            stride=stride,
-            through=self._through,
-        )
+            scene, self.renderer.shape, depth, self.model.two_sided, self.renderer.light_paths,
+            stride=stride, through=self._through,
+        )  # fmt: skip
         if share < NEGLIGIBLE_INDIRECT and not self._walks:  # the probe knows none of what goes through surfaces
             note = f"Light over other surfaces is left out: it is {100 * share:.2g} % of the direct light."
             return SceneNeeds(sampled, DIRECT, (note,))

@@ -14,7 +14,7 @@ from blender_addon.export.files.exr_file import write_exr
 from blender_addon.export.files.png_file import write_png
 from blender_addon.export.job import ExportError
 
-from ..scenes import add_camera, add_quad, new_material, world_color
+from ..scenes import add_camera, add_mesh, add_quad, emission_material, new_material, world_color
 
 
 @pytest.fixture
@@ -170,17 +170,36 @@ def test_byte_image_becomes_png(target: Any, export: Any) -> None:
         np.testing.assert_array_equal(np.asarray(found), pixels[..., :3])
 
 
-def test_pixel_aspect_stretches_the_reference(target: Any, export: Any, tmp_path: Path) -> None:
+def test_a_pixel_aspect_has_the_reference_averaged(target: Any, export: Any, tmp_path: Path) -> None:
     bpy.context.scene.render.pixel_aspect_x = 2.0
-    ramp = np.repeat(np.arange(6, dtype=np.float32)[None, :, None], 4, axis=0).repeat(3, axis=2)
+    ramp = np.repeat(np.array([0.0, 2.0, 1.0, 7.0], np.float32)[:, None, None], 6, axis=1).repeat(3, axis=2)
     write_exr(tmp_path / "ref.exr", ramp)
     before = len(bpy.data.images)
     report = export(target, reference=tmp_path / "ref.exr")
-    assert (report.request["image"]["width"], report.request["image"]["height"]) == (12, 4)
+    assert (report.request["image"]["width"], report.request["image"]["height"]) == (6, 2)
     assert len(bpy.data.images) == before
-    wanted = np.clip((np.arange(12) + 0.5) / 2 - 0.5, 0, 5)
-    np.testing.assert_allclose(read(report.folder / "reference.exr")[0, :, 0], wanted, atol=1e-6)
+    np.testing.assert_allclose(read(report.folder / "reference.exr")[:, 3, 0], [1.0, 4.0], atol=1e-6)
     assert any(note.startswith("Pixel aspect 2:1") for note in report.notes)
+
+
+def test_an_averaged_reference_is_as_sharp_as_a_render_of_square_pixels(
+    scene: Any, export: Any, render_cycles: Any, tmp_path: Path
+) -> None:
+    """Stretched ones were blurred along one side, which a fit took for roughness."""
+    render = scene.render
+    render.resolution_x, render.resolution_y, render.pixel_aspect_x, scene.cycles.samples = 32, 48, 2.0, 64
+    world_color(scene, 1.0)
+    add_camera("ORTHO", (0, 0, 5), ortho_scale=2.0)
+    corners = [(x + 0.13 * y, y - 0.13 * x, 0.0) for x in (-0.4, 0.5) for y in (-0.5, 0.4)]
+    target = add_mesh("Target", corners, [(0, 2, 3, 1)], new_material("Target"))
+    add_quad("Behind", 3.0, -1.0, emission_material("Bright", (4.0, 4.0, 4.0)))
+    render_cycles()
+    report = export(target, reference=tmp_path / "cycles.exr")
+    found = read(report.folder / "reference.exr")[:, :, :3]
+    size = report.request["image"]["width"], report.request["image"]["height"]
+    render.resolution_x, render.resolution_y, render.pixel_aspect_x = *size, 1.0
+    wanted = render_cycles()
+    assert np.abs(found - wanted).mean() < 0.02
 
 
 def tagged(path: Path, pixels: np.ndarray, **header: Any) -> None:
@@ -214,7 +233,7 @@ def test_colour_space_of_an_exr_is_said_in_the_backends_words(
 
 
 @pytest.mark.parametrize("header", [{"colorInteropID": "lin_ap1_scene"}, {"chromaticities": AP1}])
-def test_a_stretched_exr_keeps_what_it_says_of_its_colours(
+def test_an_averaged_exr_keeps_what_it_says_of_its_colours(
     header: dict[str, Any], target: Any, export: Any, tmp_path: Path
 ) -> None:
     from mfo_backend.scene.image_file import read_image
@@ -223,9 +242,9 @@ def test_a_stretched_exr_keeps_what_it_says_of_its_colours(
     tagged(tmp_path / "ref.exr", flat, **header)
     bpy.context.scene.render.pixel_aspect_x = 2.0
     report = export(target, reference=tmp_path / "ref.exr")
-    stretched = read_image(report.folder / "reference.exr")
-    assert stretched.width == 12
-    np.testing.assert_allclose(stretched.pixels[0, 0], read_image(tmp_path / "ref.exr").pixels[0, 0], rtol=1e-5)
+    averaged = read_image(report.folder / "reference.exr")
+    assert averaged.height == 2
+    np.testing.assert_allclose(averaged.pixels[0, 0], read_image(tmp_path / "ref.exr").pixels[0, 0], rtol=1e-5)
 
 
 def test_an_exr_without_a_tag_from_an_output_with_a_space_of_its_own(target: Any, export: Any, tmp_path: Path) -> None:

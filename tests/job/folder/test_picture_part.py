@@ -3,6 +3,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from PIL import Image as Picture
@@ -54,6 +56,20 @@ def test_mask_crop_and_alpha_all_have_to_agree(tmp_path):
     found, notes = with_part(picture(alpha=alpha), part, JobFolder(tmp_path))
     assert np.argwhere(found.counts).tolist() == [[row, 4] for row in range(1, 6)]
     assert "(crop, mask, alpha)" in notes[-1]
+
+
+def test_half_clear_pixels_of_a_display_picture_do_not_count(tmp_path):
+    """Over a transparent film a PNG's edges are as bright as the object: *check the camera and the shape* was said."""
+    alpha = np.ones((6, 8), np.float32)
+    alpha[0], alpha[1] = 0.0, 0.5
+    shown = Image(np.ones((6, 8, 3), np.float32), Encoding.SRGB, alpha)
+    found, (note,) = with_part(shown, PicturePart(), JobFolder(tmp_path))
+    np.testing.assert_array_equal(found.counts, alpha != 0.5)
+    assert "(16.7 %)" in note
+    faint = replace(shown, alpha=np.full((6, 8), 0.5, np.float32))  # nothing would be left
+    for other in (picture(alpha=alpha), faint):  # the first as of an EXR
+        found, notes = with_part(other, PicturePart(), JobFolder(tmp_path))
+        assert (found.counts, notes) == (None, ())
 
 
 def test_a_reference_without_alpha_says_so(tmp_path):

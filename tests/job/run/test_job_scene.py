@@ -38,11 +38,13 @@ def test_nothing_is_said_where_it_is_the_same_or_nothing_stayed() -> None:
     assert notes(Verdict.SAME, STAYED) == notes(None, STAYED) == notes(Verdict.DIFFERENT, ()) == ()
 
 
-def said_of_absent(verdict: Verdict, cause: Cause | None, parameters: str | list[str]) -> tuple[str, ...]:
+def said_of_absent(
+    verdict: Verdict, cause: Cause | None, parameters: str | list[str], leaves: tuple[Any, ...] = ()
+) -> tuple[str, ...]:
     amounts = {"Anisotropic": 0.0, "Thin Film Thickness": 420.0, "Subsurface Weight": 0.0, "Metallic": 0.0}
     sockets = {name: SimpleNamespace(value=value, linked=False) for name, value in amounts.items()}
     request: Any = SimpleNamespace(
-        materials={"target_bsdf": SimpleNamespace(sockets=sockets)},
+        materials={"target_bsdf": SimpleNamespace(sockets=sockets, leaves=leaves)},
         target=SimpleNamespace(bsdf_id="target_bsdf", labels={}), fit=SimpleNamespace(parameters=parameters),
     )  # fmt: skip
     judgement = SimpleNamespace(verdict=verdict, cause=cause)
@@ -56,6 +58,14 @@ def test_what_the_material_has_none_of_is_named_where_it_does_not_match() -> Non
     """A brushed metal whose Anisotropic was 0 was close, and nothing said why."""
     (said,) = said_of_absent(Verdict.CLOSE, Cause.MATERIAL, "all")
     assert "(Anisotropic, Subsurface Weight)" in said
+    # a car paint under a decal kept its coat of 0
+    coat = {"Coat Weight": SimpleNamespace(value=0.0, linked=False)}
+    leaves = (
+        SimpleNamespace(name="Paint", sockets=coat, free={"Roughness": "r"}),
+        SimpleNamespace(name="Held", sockets=coat, free={}),
+    )
+    (said,) = said_of_absent(Verdict.CLOSE, Cause.MATERIAL, "all", leaves)
+    assert "(Anisotropic, Subsurface Weight, Paint/Coat Weight)" in said
     assert said_of_absent(Verdict.CLOSE, Cause.LIGHT, "all") == ()
     assert said_of_absent(Verdict.SAME, None, "all") == ()
     assert said_of_absent(Verdict.CLOSE, Cause.MATERIAL, ["roughness"]) == ()
