@@ -124,6 +124,22 @@ def test_a_wall_that_some_rays_pass(
         assert np.abs(level).max() < 0.003, name
 
 
+def test_a_plain_world_is_seen_past_a_wall_that_diffuse_rays_pass(
+    scene: Any, export: Any, render_cycles: Any, mitsuba: Any
+) -> None:
+    """Cycles finds such a world by directions of materials alone; our light samples of it ended at the wall."""
+    lit_scene(scene)
+    bpy.data.objects.remove(next(item for item in scene.objects if item.type == "LIGHT"))
+    scene.cycles.samples, scene.cycles.max_bounces = 1024, 3
+    world_color(scene, 1.0)
+    target = ball(new_material("Target", Base_Color=(0.5, 0.4, 0.3), Roughness=1.0, Specular_IOR_Level=0.0))
+    wall = add_quad("Wall", 3.0, 0.0, new_material("Wall", Base_Color=(0.1, 0.1, 0.1)))
+    wall.location, wall.rotation_euler = (-1.1, 0.0, 0.0), (0.0, np.pi / 2, 0.0)
+    wall.visible_diffuse = False
+    for name, level in levels(export, render_cycles, target).items():
+        assert np.abs(level).max() < 0.003, name
+
+
 def test_subsurface_that_some_rays_pass_is_said_to_be_diffuse(scene: Any, export: Any) -> None:
     lit_scene(scene)
     target = ball(new_material("Target"))
