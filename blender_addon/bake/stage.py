@@ -46,10 +46,13 @@ def staged(
 
 
 def mesh_of(instance: bpy.types.DepsgraphObjectInstance, depsgraph: bpy.types.Depsgraph) -> bpy.types.Mesh:
-    """A new mesh of the faces that an instance shows: those of its object, or others that geometry nodes have made."""
-    item = instance.object
-    if instance.is_instance and item.data != item.original.evaluated_get(depsgraph).data:
-        return item.data.copy()
+    """A new mesh of the faces that an instance shows: those of its object, or others that geometry nodes have made.
+
+    Modifiers are evaluated anew for all its layers: in the object's own place, which an armature asks for.
+    """
+    item = instance.object.original.evaluated_get(depsgraph)
+    if instance.is_instance and instance.object.data != item.data:
+        return instance.object.data.copy()
     layers = item.original.type == "MESH"
     return bpy.data.meshes.new_from_object(item, preserve_all_data_layers=layers, depsgraph=depsgraph)
 

@@ -15,6 +15,7 @@ GLOSSY = {"Is Glossy Ray": 1.0, "Is Reflection Ray": 1.0, "Ray Depth": 1.0, "Glo
 BENT = {"Is Glossy Ray": 1.0, "Is Transmission Ray": 1.0, "Ray Depth": 1.0, "Transmission Depth": 1.0}
 SHADOW = {"Is Shadow Ray": 1.0, "Ray Depth": 1.0}
 # by the words of the backend's plugin `by_ray`
+BEHIND = "behind"  # that of what any ray finds at the back of a surface
 ANSWERS = {"scattered": SCATTERED, "glossy": GLOSSY, "transmission": BENT, "shadow": SHADOW, "camera": CAMERA}
 # outputs that tell the camera's rays from all others, and nothing else
 OF_CAMERA = ("Is Camera Ray",)
@@ -53,6 +54,11 @@ def answer_light_paths(
     None is where the tree has its `own_groups` already.
     """
     return _answered(tree, "ShaderNodeLightPath", lambda name: answers.get(name, 0.0), own_groups=own_groups)
+
+
+def answer_backfacing(tree: bpy.types.NodeTree) -> list[bpy.types.NodeTree]:
+    """Have every Geometry node say that the back is met; returns the groups that were copied for it."""
+    return _answered(tree, "ShaderNodeNewGeometry", {"Backfacing": 1.0}.get, own_groups=False)
 
 
 def answer_random(tree: bpy.types.NodeTree, number: float) -> list[bpy.types.NodeTree]:

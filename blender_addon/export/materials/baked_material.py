@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ...probe.light_path import OF_RAYS
+from ...probe.light_path import BEHIND, OF_RAYS
 from ..findings import Findings
 from ..images.color_space import to_rec709
 from ..lights.light_model import takes_light
@@ -33,11 +33,14 @@ _Weighted = tuple[NDArray[np.float32], Material]
 class Baked:
     """Files and values of one answer of `bake.surface.baked_surface`.
 
-    `circles` says that meshes hold the tangents of all its shaders.
+    `circles` says that meshes hold the tangents of all its shaders, and `others` are kinds of rays that find another
+    look of it.
     """
 
-    def __init__(self, answer: Mapping[str, Any], folder: Path, *, circles: bool = False) -> None:
-        self._answer, self._folder, self._circles = answer, folder, circles
+    def __init__(
+        self, answer: Mapping[str, Any], folder: Path, *, circles: bool = False, others: Collection[str] = ()
+    ) -> None:
+        self._answer, self._folder, self._circles, self._others = answer, folder, circles, others
 
     @property
     def corners(self) -> NDArray[np.float32]:
@@ -179,8 +182,11 @@ class Baked:
         if self._answer["around"]:
             asked = ", ".join(self._answer["around"])
             findings.note(f"Material '{name}': {asked} sees its own object alone in the fit.")
-        if self._answer["sides"]:
-            findings.note(f"Material '{name}' asks for Backfacing: in the fit both sides are as its front is.")
+        if self._answer["sides"] and self._others:  # else its back is that of an opaque, closed surface
+            if BEHIND not in self._others:
+                findings.note(f"Material '{name}' asks for Backfacing: in the fit both sides are as its front is.")
+            elif "emission" in self._answer:
+                findings.note(f"Material '{name}' asks for Backfacing: in the fit both sides glow as its front does.")
         left_out = [socket for socket in self._answer["left_out"] if not (self._circles and socket == "Tangent")]
         if left_out:
             findings.note(f"Material '{name}': what is linked to {', '.join(left_out)} is left out.")

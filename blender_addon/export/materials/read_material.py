@@ -16,16 +16,11 @@ from ..audit.rules import name_settings
 from ..audit.shading_table import MATERIAL, MATERIAL_CYCLES
 from ..findings import Findings, Fix
 from ..material_model import Material, Socket
+from ..nodes.backs import is_hollow_behind, turns_on_backs
 from ..nodes.closure_leaves import OUTPUT, UNKNOWN, ClosureLeaf
 from ..nodes.dependence import OF_SIDE, asked_for, asked_of_side
 from ..nodes.displacement import SHADING_NORMAL, bends_normals, displacement_of
-from ..nodes.graph_findings import (
-    graph_problem,
-    is_of_normal_map,
-    note_few_samples,
-    note_missing_pictures,
-    note_pixel_sizes,
-)
+from ..nodes.graph_findings import graph_problem, note_few_samples, note_missing_pictures, note_pixel_sizes
 from ..nodes.leaf_kinds import (
     EMISSION,
     TRANSPARENT,
@@ -123,10 +118,10 @@ def _read_displacement(
     problem = graph_problem(displacement, is_copied=True)
     if problem is not None:
         findings.error(f"Displacement of material '{material.name}' is linked to {problem}: mend or unlink it.")
-    bent = (found, *found.leaves) if bends_normals(material) else ()
+    bent, turned = (found, *found.leaves) if bends_normals(material) else (), is_hollow_behind(displacement)
     for leaf in bent:
         if leaf.model == "principled":
-            leaf.sockets[SHADING_NORMAL] = Socket([0.0, 0.0, 0.0], True, by_graph=True)
+            leaf.sockets[SHADING_NORMAL] = Socket([0.0, 0.0, 0.0], True, by_graph=True, turned=turned)
 
 
 def note_leaves(material: str, target: TargetShader, findings: Findings) -> None:
@@ -301,7 +296,7 @@ def _read_direction(name: str, place: Place, material: str, findings: Findings) 
     by_graph = source is not None and not (name == "Tangent" and is_uv_tangent(source.node))
     if by_graph:
         refuse_link(name, place, material, findings, is_copied=True)
-    turned = by_graph and is_of_normal_map(source)
+    turned = by_graph and turns_on_backs(source)
     return Socket(plain_value(socket), source is not None, by_graph=by_graph, turned=turned)
 
 

@@ -31,6 +31,13 @@ class CornerMesh:
     vertices: NDArray[np.int32]  # (triangles, 3), each at least 0
     tangents: NDArray[np.float32] | None = None  # (triangles, 3, 3)
 
+    @property
+    def is_open(self) -> bool:
+        """Whether it has an edge of one triangle alone, past which its back can be seen."""
+        ends = np.sort(self.vertices[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2), axis=1).astype(np.int64)
+        _, triangles = np.unique(ends[:, 0] << 32 | ends[:, 1], return_counts=True)
+        return bool((triangles == 1).any())
+
 
 def same_mesh(first: CornerMesh, second: CornerMesh) -> bool:
     """Whether two meshes have equal numbers; those with NaN count as others."""
@@ -60,6 +67,11 @@ class Piece:
             with np.errstate(invalid="ignore", over="ignore"):
                 places = places @ self.matrix[:3, :3].T + self.matrix[:3, 3]
                 yield places[(np.abs(places) < FARTHEST).all(axis=(1, 2))]
+
+    def may_hold(self, point: NDArray[np.float64]) -> bool:
+        """Whether a point of the world is within its bounds, as that of a camera in a room."""
+        ends = np.array([(corners.min(axis=(0, 1)), corners.max(axis=(0, 1))) for corners in self.corners()])
+        return len(ends) > 0 and bool(((ends[:, 0].min(axis=0) <= point) & (point <= ends[:, 1].max(axis=0))).all())
 
     def left_out(self) -> int:
         """How many triangles `placed` leaves out."""

@@ -12,12 +12,17 @@ BENDING = ("ShaderNodeBsdfGlass", "ShaderNodeBsdfRefraction")
 
 def bends_light(item: bpy.types.Object) -> bool:
     """Whether some of it goes on by a bend: glass, refraction, transmission."""
-    return any(node.bl_idname in BENDING or _differs(node, "Transmission Weight", 0.0) for node in nodes_of(item))
+    return any(map(is_bending, nodes_of(item)))
 
 
 def passes_light(item: bpy.types.Object) -> bool:
     """Whether some of it goes straight on: transparency, alpha."""
     return any(map(is_clear, nodes_of(item)))
+
+
+def is_bending(node: bpy.types.Node) -> bool:
+    """Whether light goes on by a bend through a shader, or a part of it."""
+    return node.bl_idname in BENDING or _differs(node, "Transmission Weight", 0.0)
 
 
 def is_clear(node: bpy.types.Node) -> bool:

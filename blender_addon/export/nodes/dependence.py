@@ -7,6 +7,8 @@ from collections.abc import Iterator, Mapping
 
 import bpy
 
+from .clear_objects import is_bending, is_clear
+
 Outputs = Mapping[str, tuple[str, ...]]  # names of outputs by kind of node
 
 # look at what is around an object, while a bake is of one object alone
@@ -21,6 +23,12 @@ OF_VIEW = {
 }
 # differ between the two sides of a surface, while a bake looks at the front
 OF_SIDE = {"ShaderNodeNewGeometry": ("Backfacing",)}
+# differ between the two sides of a surface, from wherever each is looked at; so does what pictures by BOX show
+OF_BACK = {
+    "ShaderNodeNewGeometry": ("Normal", "True Normal", "Backfacing"),
+    "ShaderNodeTexCoord": ("Normal",),
+    "ShaderNodeBevel": ("Normal",),
+}
 # differ between the two sides of a surface wherever it is looked at from
 OF_FACING = {
     "ShaderNodeNewGeometry": ("Normal", "True Normal", "Incoming", "Backfacing"),
@@ -75,14 +83,24 @@ def asked_of_instancer(tree: bpy.types.NodeTree) -> list[str]:
     return sorted({node.bl_label for node in _nodes(tree) if _asks_instancer(node)})
 
 
+def differs_behind(tree: bpy.types.NodeTree) -> bool:
+    """Whether something asks for what a bake of the front does not know of the back."""
+    return bool(asked_for(tree, OF_BACK)) or any(map(_projects_by_normals, _nodes(tree)))
+
+
+def lets_light_through(tree: bpy.types.NodeTree) -> bool:
+    """Whether light goes through the surface, or a part of it."""
+    nodes = list(_nodes(tree))
+    return any(is_clear(node) or is_bending(node) or node.bl_idname == "ShaderNodeBsdfTranslucent" for node in nodes)
+
+
 def asked_of_side(tree: bpy.types.NodeTree) -> list[str]:
     """Labels of nodes that answer a ray that meets the back of a surface with other values than one at its front."""
     kinds = ("ShaderNodeLightPath", *OF_SURROUNDINGS)
     others = {
         node.bl_label
         for node in _nodes(tree)
-        if (node.bl_idname in kinds and any(output.is_linked for output in node.outputs))
-        or getattr(node, "projection", "") == "BOX"
+        if (node.bl_idname in kinds and any(output.is_linked for output in node.outputs)) or _projects_by_normals(node)
     }
     return sorted({*asked_for(tree, OF_FACING), *others})
 
@@ -118,6 +136,10 @@ def _nodes(tree: bpy.types.NodeTree) -> Iterator[bpy.types.Node]:
             yield from _nodes(node.node_tree)
         else:
             yield node
+
+
+def _projects_by_normals(node: bpy.types.Node) -> bool:
+    return getattr(node, "projection", "") == "BOX"
 
 
 def _is_asked(node: bpy.types.Node, outputs: Outputs) -> bool:

@@ -11,18 +11,18 @@ import bpy
 
 from ...versions import active_output
 from ..findings import Findings
-from .shader_graph import Links, source_of
+from .shader_graph import Links
 
 GROUP, GROUP_INPUT = "ShaderNodeGroup", "NodeGroupInput"
 # rays of a Bevel node: on a box with rounded edges a block under a highlight was 10 % too bright with 4, Blender's own
 # number, and 1 % with 16 (the level 0.3 % either way)
 STEADY_BEVEL = 16
 PICTURES = ("ShaderNodeTexImage", "ShaderNodeTexEnvironment")
-_Groups = tuple[bpy.types.Node, ...]
+Groups = tuple[bpy.types.Node, ...]
 _Place = tuple[int, ...]  # pointers: the same node in two places of a group is two
 
 
-def graph_problem(socket: bpy.types.NodeSocket, *, groups: _Groups = (), is_copied: bool) -> str | None:
+def graph_problem(socket: bpy.types.NodeSocket, *, groups: Groups = (), is_copied: bool) -> str | None:
     """What is wrong with the nodes that feed `socket`, said as what it is linked to; None if nothing is.
 
     `groups` are the group nodes it lies in, and `is_copied` says that a copy of the file is evaluated, which does not
@@ -68,12 +68,12 @@ class _Way:
     """An output that is looked at, and what of the sockets that feed it is still to come: graphs have any depth."""
 
     place: _Place | None
-    further: Iterator[tuple[bpy.types.NodeSocket, _Groups]]
+    further: Iterator[tuple[bpy.types.NodeSocket, Groups]]
 
 
 def feeding(
-    node: bpy.types.Node, output: bpy.types.NodeSocket, groups: _Groups
-) -> Iterator[tuple[bpy.types.NodeSocket, _Groups]]:
+    node: bpy.types.Node, output: bpy.types.NodeSocket, groups: Groups
+) -> Iterator[tuple[bpy.types.NodeSocket, Groups]]:
     """The sockets that an output depends on, and the groups they are in."""
     if node.bl_idname == GROUP:
         inner = None if node.node_tree is None else group_output(node.node_tree)
@@ -89,19 +89,6 @@ def group_output(tree: bpy.types.NodeTree) -> bpy.types.Node | None:
     """The node of a group whose inputs are what the group gives."""
     outputs = [node for node in tree.nodes if node.bl_idname == "NodeGroupOutput"]
     return next((node for node in outputs if node.is_active_output), outputs[0] if outputs else None)
-
-
-def is_of_normal_map(source: bpy.types.NodeSocket) -> bool:
-    """Whether a Normal Map makes what an output gives, inside of groups where it is a group's.
-
-    Cycles turns its normal round on back faces, and mirrors that of a Bump there.
-    """
-    node = source.node
-    if node.bl_idname != GROUP or node.node_tree is None:
-        return node.bl_idname == "ShaderNodeNormalMap"
-    end = group_output(node.node_tree)
-    inner = None if end is None else source_of(end.inputs[source.identifier])
-    return inner is not None and is_of_normal_map(inner)
 
 
 def _problem(node: bpy.types.Node, is_copied: bool) -> str | None:
@@ -175,8 +162,16 @@ def _is_missing(image: bpy.types.Image | None) -> bool:
 
 
 def _nodes_before(sockets: Iterable[bpy.types.NodeSocket]) -> Iterator[bpy.types.Node]:
-    """Every node that is not muted and feeds `sockets`, each once for each place it is used in."""
-    left: list[tuple[bpy.types.NodeSocket, _Groups]] = [(socket, ()) for socket in sockets]
+    """Every node that is not muted and feeds `sockets`, each as often as `outputs_before` has it."""
+    return (output.node for output in outputs_before(sockets))
+
+
+def outputs_before(sockets: Iterable[bpy.types.NodeSocket], groups: Groups = ()) -> Iterator[bpy.types.NodeSocket]:
+    """Every output that feeds `sockets`, of nodes that are not muted, each once for each place it is used in.
+
+    `groups` are the group nodes that the sockets lie in.
+    """
+    left = [(socket, groups) for socket in sockets]
     links = Links()
     met: set[_Place] = set()
     while left:
@@ -189,5 +184,5 @@ def _nodes_before(sockets: Iterable[bpy.types.NodeSocket]) -> Iterator[bpy.types
         if place not in met:
             met.add(place)
             if not node.mute:
-                yield node
+                yield output
             left += feeding(node, output, within)

@@ -20,7 +20,7 @@ from ...bake.panorama import ALIKE, LEAST_WIDTH, MOST_WIDTH
 from ...bake.requests import name_of
 from ...bake.stage import color_of
 from ...probe.client import Probe
-from ...probe.light_path import OF_CAMERA, other_looks
+from ...probe.light_path import BEHIND, OF_CAMERA, other_looks
 from ...versions import node_tree_of
 from ..camera.camera_model import Camera
 from ..findings import Findings
@@ -42,6 +42,8 @@ from ..nodes.dependence import (
     asked_for,
     asked_of_instancer,
     asked_of_place,
+    differs_behind,
+    lets_light_through,
 )
 from ..nodes.displacement import bends_normals
 from ..nodes.graph_findings import note_missing_pictures, note_pixel_sizes
@@ -172,7 +174,7 @@ class SceneBakes:
                 request |= {"size": _texels(data.camera, surface.piece), "rays": "scattered"}
                 data.materials[identifier] = grey(material.name)
                 asked = self._surfaces[identifier] = _Asked(material, item.name, request)
-                others = other_looks(node_tree_of(material))
+                others = other_looks(node_tree_of(material)) or _looks_behind(data.camera, surface)
                 asked.looks = {rays: f"{identifier}_{of}" for rays, of in others.items()}
                 for of in dict.fromkeys(others.values()):
                     self._surfaces[f"{identifier}_{of}"] = _Asked(material, item.name, request | {"rays": of})
@@ -221,7 +223,8 @@ class SceneBakes:
             try:
                 if found[index]["status"] != "ok":
                     raise BakeError(found[index]["sentence"])
-                baked = Baked(found[index], folder / str(index), circles=bool(turned_axis(asked.material)))
+                circles = bool(turned_axis(asked.material))
+                baked = Baked(found[index], folder / str(index), circles=circles, others=asked.looks)
                 self._put_surface(data, findings, identifier, asked, baked)
             except BakeError as problem:
                 _give_up(data, identifier, asked.material, asked.owner, problem, findings)
@@ -311,6 +314,15 @@ def _own_of_place(surface: Surface, tree: bpy.types.NodeTree) -> Own:
     proportions = np.round((linear / size).T @ (linear / size) / SIZE_STEP)[np.triu_indices(3)] + 0.0
     step = round(math.log(size) / math.log1p(SIZE_STEP)) if by_size else 0
     return (*map(float, proportions), float(step), math.copysign(1.0, volume))
+
+
+def _looks_behind(camera: Camera, surface: Surface) -> dict[str, str]:
+    """Another look of a surface's back, where nodes give it one and something may meet it; see `other_looks`."""
+    tree = node_tree_of(surface.material)
+    if tree is None or not differs_behind(tree):
+        return {}
+    is_met = surface.piece.mesh.is_open or lets_light_through(tree) or surface.piece.may_hold(camera.world[:3, 3])
+    return {BEHIND: BEHIND} if is_met else {}
 
 
 def _texels(camera: Camera, piece: Piece) -> int:

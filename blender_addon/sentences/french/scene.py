@@ -200,6 +200,7 @@ SCENE = {
     "Material '{}' bends normals of '{}' by the size of each instance; beyond {} sizes all have those of the first.": "Le matériau '{}' courbe les normales de '{}' selon la taille de chaque instance ; au-delà de {} tailles, toutes ont celles de la première.",
     "Material '{}': what {} tell of each instance of '{}' is left out: in the fit it is as of the object alone.": "Matériau '{}' : ce que {} dit de chaque instance de '{}' est omis : dans l'ajustement, c'est comme pour l'objet seul.",
     "Material '{}' asks for Backfacing: in the fit both sides are as its front is.": "Le matériau '{}' demande Face arrière (Backfacing) : dans l'ajustement, les deux faces sont comme sa face avant.",
+    "Material '{}' asks for Backfacing: in the fit both sides glow as its front does.": "Le matériau '{}' demande Face arrière (Backfacing) : dans l'ajustement, les deux faces brillent comme sa face avant.",
     "Material '{}': {} sees its own object alone in the fit.": "Matériau '{}' : {} ne voit dans l'ajustement que son propre objet.",
     "Node '{}' of material '{}' is muted: press M over it in the Shader Editor.": "Le nœud '{}' du matériau '{}' est muet : appuyer sur M au-dessus de lui dans l'éditeur de shaders.",
     "Of the mix '{}' alone is fitted: {}.": "Du mélange, seul '{}' est ajusté : {}.",

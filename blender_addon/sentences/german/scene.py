@@ -201,6 +201,7 @@ SCENE = {
     "Material '{}' bends normals of '{}' by the size of each instance; beyond {} sizes all have those of the first.": "Material '{}' biegt die Normalen von '{}' je nach Größe jeder Instanz; ab {} Größen haben alle die der ersten.",
     "Material '{}': what {} tell of each instance of '{}' is left out: in the fit it is as of the object alone.": "Material '{}': was {} von jeder Instanz von '{}' sagt, wird weggelassen: In der Anpassung ist es wie beim Objekt allein.",
     "Material '{}' asks for Backfacing: in the fit both sides are as its front is.": "Material '{}' fragt nach Rückseite (Backfacing): In der Anpassung sind beide Seiten wie die Vorderseite.",
+    "Material '{}' asks for Backfacing: in the fit both sides glow as its front does.": "Material '{}' fragt nach Rückseite (Backfacing): In der Anpassung leuchten beide Seiten wie die Vorderseite.",
     "Material '{}': {} sees its own object alone in the fit.": "Material '{}': {} sieht in der Anpassung nur das eigene Objekt.",
     "Node '{}' of material '{}' is muted: press M over it in the Shader Editor.": "Node '{}' von Material '{}' ist stumm: im Shader-Editor M darüber drücken.",
     "Of the mix '{}' alone is fitted: {}.": "Von der Mischung wird nur '{}' angepasst: {}.",

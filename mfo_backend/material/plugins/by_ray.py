@@ -2,7 +2,8 @@
 """The Mitsuba BSDF `by_ray`: a surface that is something else to other rays, as nodes of Blender's Light Path have it.
 
 Choose the variant before importing this. Nested BSDFs are named by the rays that meet them (`RAYS`); `scattered` is
-for all that have none of their own. Integrators write the number of a ray's kind into `si.duv_dy.y`.
+for all that have none of their own, and `behind` for all that meet the back. Integrators write the number of a ray's
+kind into `si.duv_dy.y`.
 """
 
 # pyright: reportArgumentType=false, reportCallIssue=false, reportOperatorIssue=false
@@ -18,6 +19,7 @@ from typing import Any
 import drjit as dr
 import mitsuba as mi
 
+from .mapped_normal import is_behind
 from .ray_kinds import RAYS, SCATTERED
 
 PLUGIN_NAME = "by_ray"
@@ -31,7 +33,8 @@ class ByRay(mi.BSDF):
     def __init__(self, props: mi.Properties) -> None:
         mi.BSDF.__init__(self, props)
         self._looks = {number: props[name] for number, name in enumerate(RAYS) if name in props}
-        looks = self._looks.values()
+        self._behind = props.get("behind", None)
+        looks = [*self._looks.values(), *filter(None, [self._behind])]
         self.m_components = [look.flags(k) for look in looks for k in range(look.component_count())]
         self.m_flags = reduce(or_, self.m_components)
 
@@ -44,6 +47,8 @@ class ByRay(mi.BSDF):
         """Show the nested BSDFs."""
         for number, look in self._looks.items():
             callback.put(RAYS[number], look, mi.ParamFlags.Differentiable)
+        if self._behind is not None:
+            callback.put("behind", self._behind, mi.ParamFlags.Differentiable)
 
     def eval(self, ctx: mi.BSDFContext, si: mi.SurfaceInteraction3f, wo: mi.Vector3f, active: Any = True) -> Any:
         """f_r |cos|, RGB."""
@@ -103,9 +108,13 @@ class ByRay(mi.BSDF):
     def _of(self, si: mi.SurfaceInteraction3f, active: Any) -> Iterator[tuple[Any, mi.Bool]]:
         """The BSDFs, and where each is asked."""
         others = mi.Bool(active)
+        if self._behind is not None:
+            here = others & is_behind(si)
+            others &= ~here
+            yield self._behind, here
         for number, look in self._looks.items():
             if number != SCATTERED:
-                here = mi.Bool(active) & (si.duv_dy.y == number)
+                here = others & (si.duv_dy.y == number)
                 others &= ~here
                 yield look, here
         yield self._looks[SCATTERED], others

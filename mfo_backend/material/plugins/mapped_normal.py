@@ -39,7 +39,7 @@ class MappedNormal(mi.Texture):
 
     def is_behind(self, si: mi.SurfaceInteraction3f) -> Any:
         """Whether the back of the mesh is seen."""
-        return dr.dot(si.n, si.to_world(si.wi)) < 0
+        return is_behind(si)
 
     def eval(self, si: mi.SurfaceInteraction3f, active: Any = True) -> mi.Color3f:
         """Unit vectors of the world."""
@@ -49,6 +49,11 @@ class MappedNormal(mi.Texture):
     def is_spatially_varying(self) -> bool:
         """Always."""
         return True
+
+
+def is_behind(si: mi.SurfaceInteraction3f) -> Any:
+    """Whether the back of a mesh is seen."""
+    return dr.dot(si.n, si.to_world(si.wi)) < 0
 
 
 def register() -> None:

@@ -17,9 +17,10 @@ import mitsuba as mi
 
 from ...types.light_paths import LightPaths
 from .camera_view import CameraView
-from .exit_light import light_from_below, materials_with_below
+from .exit_light import light_from_below
 from .shadow_rays import ShadowRays
 from .smooth_facets import seen_side
+from .subsurface_walks import materials_with_below
 
 
 def seen_from_below(

@@ -28,6 +28,7 @@ from .absorption import Inside
 from .camera_view import CameraView
 from .shadow_rays import ShadowRays, is_unsampled, sample_light
 from .smooth_facets import TRANSMITS, leaves_on, met_light, seen_side
+from .subsurface_walks import materials_with_below, walks_at
 
 PLUGIN_NAME = "cycles_path"
 LEAST_CHANCE = 1e-6  # of a path to go on, for a division: one that is black by then shows nothing. No measurement
@@ -84,6 +85,7 @@ class CyclesPath(RBIntegrator):
         lamps, shadows = SceneLamps(scene), ShadowRays(scene)
         terminator, view, absorption = shadows.terminator, CameraView(scene), shadows.absorption
         context, materials, by_ray = mi.BSDFContext(), MaterialKinds(scene), shadows.by_ray
+        below = materials_with_below(scene) if walked else []
         ray = mi.Ray3f(dr.detach(ray))
         radiance = mi.Spectrum(0 if primal else state_in)
         change = mi.Spectrum(0 if δL is None else δL)
@@ -131,11 +133,11 @@ class CyclesPath(RBIntegrator):
             by_others = bounce == 0
             if dr.hint(before is not None, mode="scalar"):  # cut-outs behind a bounce are not looked through
                 by_others = (bounce == 1) & (passages == 0)
-            without = dr.select(by_others, float(walked), 0.0)
+            bsdf = si.bsdf(ray)
+            without = dr.select(by_others & walks_at(bsdf, below), 1.0, 0.0)
             si.duv_dx = mi.Point2f(least_alpha(self.filter_glossy, least), without)
             if dr.hint(by_ray, mode="scalar"):
                 si.duv_dy = mi.Point2f(0, kind)
-            bsdf = si.bsdf(ray)
             if dr.hint(absorption, mode="scalar"):
                 with dr.resume_grad(when=not primal):
                     dimmed = absorption.left(absorption.lengths(inside, si.t))

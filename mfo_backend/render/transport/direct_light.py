@@ -16,7 +16,7 @@ from mitsuba.ad.integrators.prb import PRBIntegrator  # pyright: ignore[reportMi
 from ...types.light_paths import LightPaths
 from ..lamps.met_lamps import lights_have_no_extent
 from .below_surface import WithBelow
-from .exit_light import materials_with_below
+from .subsurface_walks import materials_with_below
 
 
 def picture_integrator(scene: mi.Scene, light_paths: LightPaths | None) -> Any:

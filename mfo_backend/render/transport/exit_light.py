@@ -24,18 +24,12 @@ from ..lamps.met_lamps import DELTA, SceneLamps
 from ..random_numbers.path_random import PathRandom
 from .shadow_rays import ShadowRays
 from .smooth_facets import leaves_on, met_light, seen_side
-from .subsurface_walks import walked
+from .subsurface_walks import materials_with_below, walked
 from .traced_radiance import traced_radiance
 
 # Walks of one path in all; a Lambert lobe stands for what a further one would bring. With one, Suzanne of wax is 1 %
 # too dark, with three 0.2 % (docs/notebook/subsurface.md)
 MOST_WALKS = 3
-
-
-def materials_with_below(scene: mi.Scene) -> list[Any]:
-    """The materials of a scene that let light walk below their surface."""
-    found = {id(bsdf): bsdf for bsdf in (shape.bsdf() for shape in scene.shapes()) if getattr(bsdf, "has_below", False)}
-    return list(found.values())
 
 
 def light_from_below(

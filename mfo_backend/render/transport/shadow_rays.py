@@ -22,7 +22,7 @@ import mitsuba as mi
 import numpy as np
 
 from ...material.arrays.own_memory import own_memory
-from ...material.plugins.ray_kinds import SHADOW, is_by_ray
+from ...material.plugins.ray_kinds import SCATTERED, SHADOW, is_by_ray
 from .absorption import Absorption, Inside
 from .ray_starts import RayStarts, lets_through
 from .smooth_facets import TRANSMITS, ShadowTerminator, leaves_on, shape_number, shape_table
@@ -127,7 +127,8 @@ class ShadowRays:
             lengths = absorption.further(lengths, inside, segment)
             active &= si.is_valid()
             if self.by_ray:
-                si.duv_dy = mi.Point2f(0, SHADOW)
+                # what Cycles leaves to directions of materials is met as these are, of which most are diffuse
+                si.duv_dy = mi.Point2f(0, dr.select(asked, SHADOW, SCATTERED))
             bsdf = si.bsdf()
             share = mi.Color3f(bsdf.eval_null_transmission(si, active))
             own = active & (bsdf == of)

@@ -41,6 +41,20 @@ class Walks:
     held: tuple[Any, ...]
 
 
+def materials_with_below(scene: mi.Scene) -> list[Any]:
+    """The materials of a scene that let light walk below their surface."""
+    found = {id(bsdf): bsdf for bsdf in (shape.bsdf() for shape in scene.shapes()) if getattr(bsdf, "has_below", False)}
+    return list(found.values())
+
+
+def walks_at(bsdf: mi.BSDFPtr, materials: Sequence[Any]) -> mi.Bool:
+    """Whether a surface is of one of these `materials`: of a mix or what rays tell apart a Lambert lobe stands in."""
+    found = mi.Bool(False)
+    for material in materials:
+        found |= bsdf == mi.BSDFPtr(material)
+    return found
+
+
 def walked(
     scene: mi.Scene,
     si: mi.SurfaceInteraction3f,

@@ -15,7 +15,11 @@ from blender_addon.export.camera.camera_model import Camera
 from blender_addon.export.meshes.mesh_arrays import CornerMesh, Piece
 from blender_addon.export.scene.scene_bakes import LEAST_SIZE, MOST_SIZE, TEXELS_A_PIXEL, USED, _texels
 
+from ..baked_shapes import at_vertices, shape_of, texture
 from ..scenes import add_quad, new_material
+from .test_baked_surfaces import Nodes, stage
+
+__all__ = ["stage"]  # a fixture
 
 ABOVE = np.array([[1.0, 0, 0, 0], [0, 1, 0, 0], [0, 0, 1, 5], [0, 0, 0, 1]])
 CAMERA = Camera(
@@ -64,7 +68,31 @@ def test_a_pictures_shape_does_not_stretch_the_map_of_a_bake(scene: Any, width: 
     node = material.node_tree.nodes.new("ShaderNodeTexImage")
     node.image = bpy.data.images.new("Logo", width, 64)
     material.node_tree.nodes.active = node
-    uv = unwrapped(add_quad("Sign", 1.0, 0.0, material).data, np.ones(1, np.bool_), bpy.context.scene)
+    uv = unwrapped(add_quad("Sign", 1.0, 0.0, material).data, np.ones(1, np.bool_), bpy.context.scene, LEAST_SIZE)
     sides = np.ptp(uv, axis=0)
     assert sides[0] == pytest.approx(sides[1], rel=1e-3)
     assert sides.min() > 0.45
+
+
+@pytest.mark.parametrize("across", [1, 4])
+def test_a_border_of_a_map_takes_nothing_from_the_faces_beside_it(stage: Any, export: Any, across: int) -> None:
+    """Boxes in one bake, whose faces have their normals for colours: beside a texel of one lay a mean of two."""
+    target, item, _ = stage
+    bpy.ops.mesh.primitive_cube_add(size=0.4)
+    box = bpy.context.object
+    bpy.data.objects.remove(item)
+    box.data.materials.append(new_material("Boxes"))
+    nodes = Nodes(box.data.materials[0])
+    for axis in range(2):
+        row = box.modifiers.new("Row", "ARRAY")
+        row.count, row.relative_offset_displace = across, (1.2 * (axis == 0), 1.2 * (axis == 1), 0.0)
+    color = nodes.place()
+    nodes.tree.links.new(nodes.new("NewGeometry").outputs["True Normal"], color.node.inputs[0])
+    nodes.tree.links.new(color, nodes.principled.inputs["Base Color"])
+    report = export(target)
+    bsdf, _, uv = shape_of(report)
+    picture = texture(report, bsdf, "Base Color")
+    nearest = np.array([(x, y) for x in (-0.5, 0.5) for y in (-0.5, 0.5)]) / len(picture)  # what filtering takes
+    around = [at_vertices(picture, uv + place) for place in nearest]
+    assert np.ptp(around, axis=0).max() < 0.01
+    assert np.sort(np.abs(around[0] - 0.5), axis=1) == pytest.approx(np.tile((0.0, 0.0, 0.5), (len(uv), 1)), abs=0.01)

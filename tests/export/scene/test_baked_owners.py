@@ -11,7 +11,9 @@ import pytest
 
 from blender_addon.bake.stage import copy_properties
 
+from ..baked_shapes import at_vertices, shape_of, texture
 from ..scenes import add_camera, add_quad, new_material, world_color
+from .test_baked_surfaces import Nodes
 
 CENTRE = np.s_[16, 16]  # of a picture of 32 x 32 pixels
 
@@ -236,3 +238,31 @@ def test_what_cycles_has_no_node_for_has_no_link(stage: Any, export: Any, render
     own.links.new(own.nodes.new("ShaderNodeShaderToRGB").outputs[0], principled.inputs["Base Color"])
     linked = export(target, "linked").request["materials"]["target_bsdf"]["sockets"]["Base Color"]
     assert linked["value"] == plain["value"]
+
+
+@pytest.mark.parametrize("kind", ["SIMPLE_DEFORM", "MIRROR"])
+def test_a_modifier_that_looks_at_another_object_finds_an_instance_where_its_object_is(
+    stage: Any, export: Any, kind: str
+) -> None:
+    """Faces of an instance had the modifiers as if its object were in the instance's place, and Position was theirs."""
+    (target, box), nodes = stage, Nodes(stage[1].data.materials[0])
+    other = bpy.data.objects.new("Other", None)
+    other.location, other.rotation_euler = (0.3, 0.0, 0.2), (0.3, 0.2, 0.0)
+    bpy.context.scene.collection.objects.link(other)
+    modifier: Any = box.modifiers.new("Looks", kind)
+    if kind == "SIMPLE_DEFORM":
+        modifier.deform_method, modifier.factor, modifier.origin = "TAPER", 0.5, other
+    else:
+        modifier.mirror_object = other
+    box.modifiers.new("Divided", "SUBSURF").render_levels = 3
+    nodes.tree.links.new(nodes.place(), nodes.principled.inputs["Base Color"])
+    prefab, instance = bpy.data.collections.new("Prefab"), bpy.data.objects.new("Instance", None)
+    prefab.objects.link(box)
+    bpy.context.scene.collection.objects.unlink(box)
+    instance.instance_type, instance.instance_collection = "COLLECTION", prefab
+    instance.location, instance.scale, instance.rotation_euler = (-0.3, 0.2, 0.1), (0.6, 0.8, 0.7), (0.0, 0.5, 0.0)
+    bpy.context.scene.collection.objects.link(instance)
+    report = export(target)
+    bsdf, positions, uv = shape_of(report)
+    found = at_vertices(texture(report, bsdf, "Base Color"), uv)
+    assert np.sqrt(np.mean((found - 0.5 * positions - 0.5) ** 2)) < 0.01

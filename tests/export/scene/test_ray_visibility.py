@@ -124,6 +124,22 @@ def test_a_wall_that_some_rays_pass(
         assert np.abs(level).max() < 0.003, name
 
 
+def test_a_plain_world_is_seen_past_a_wall_that_diffuse_rays_pass(
+    scene: Any, export: Any, render_cycles: Any, mitsuba: Any
+) -> None:
+    """Cycles finds such a world by directions of materials alone; our light samples of it ended at the wall."""
+    lit_scene(scene)
+    bpy.data.objects.remove(next(item for item in scene.objects if item.type == "LIGHT"))
+    scene.cycles.samples, scene.cycles.max_bounces = 1024, 3
+    world_color(scene, 1.0)
+    target = ball(new_material("Target", Base_Color=(0.5, 0.4, 0.3), Roughness=1.0, Specular_IOR_Level=0.0))
+    wall = add_quad("Wall", 3.0, 0.0, new_material("Wall", Base_Color=(0.1, 0.1, 0.1)))
+    wall.location, wall.rotation_euler = (-1.1, 0.0, 0.0), (0.0, np.pi / 2, 0.0)
+    wall.visible_diffuse = False
+    for name, level in levels(export, render_cycles, target).items():
+        assert np.abs(level).max() < 0.003, name
+
+
 def test_subsurface_that_some_rays_pass_is_said_to_be_diffuse(scene: Any, export: Any) -> None:
     lit_scene(scene)
     target = ball(new_material("Target"))
@@ -187,3 +203,21 @@ def test_a_wall_that_the_camera_looks_through(scene: Any, export: Any, render_cy
     add_quad("Wall", 2.0, 1.6, material_by_rays("BsdfDiffuse", "Is Camera Ray"))
     for name, level in levels(export, render_cycles, target).items():
         assert np.abs(level).max() < 0.005, name
+
+
+@pytest.mark.parametrize("hidden", [[], ["diffuse"], ["glossy"]])
+def test_wax_that_some_rays_pass_shines_beside_other_wax(
+    scene: Any, export: Any, render_cycles: Any, mitsuba: Any, hidden: list[str]
+) -> None:
+    """Its light was left out for a walk that nobody made: it was black. A Lambert lobe stands in, 8 % too bright."""
+    lit_scene(scene)
+    scene.cycles.samples, scene.cycles.max_bounces = 256, 3
+    values = {"Base_Color": (0.8, 0.5, 0.3), "Subsurface_Weight": 1.0, "Subsurface_Scale": 0.002}
+    target = ball(new_material("Target", **values))
+    floor = add_quad("Floor", 4.0, -1.2, new_material("Floor", **values))
+    for kind in hidden:
+        setattr(floor, f"visible_{kind}", False)
+    renderer, wanted = renderer_and_cycles(export, render_cycles, target)
+    beside = ~renderer.target_mask() & (wanted.max(axis=-1) > 0.0)
+    found = renderer.image(renderer.start, seed=1, spp=256)
+    assert found[beside].mean() == pytest.approx(wanted[beside].mean(), rel=0.1 if hidden else 0.02)

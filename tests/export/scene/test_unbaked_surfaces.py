@@ -92,12 +92,12 @@ def test_without_a_second_blender_the_nearest_model_stays(
 
 
 @pytest.mark.parametrize("asked", [False, True])
-def test_a_surface_with_two_sides_is_said(asked: bool, stage: Any, export: Any) -> None:
+def test_a_surface_with_two_sides_that_rays_tell_apart_is_said(asked: bool, stage: Any, export: Any) -> None:
+    """Rays of each kind have a look of it, but for the back."""
     target, _, nodes = stage
-    geometry = nodes.new("NewGeometry")
-    nodes.tree.links.new(
-        geometry.outputs["Backfacing" if asked else "Pointiness"], nodes.principled.inputs["Roughness"]
-    )
+    link, geometry = nodes.tree.links.new, nodes.new("NewGeometry")
+    link(geometry.outputs["Backfacing" if asked else "Pointiness"], nodes.principled.inputs["Roughness"])
+    link(nodes.new("LightPath").outputs["Is Glossy Ray"], nodes.principled.inputs["Metallic"])
     said = "Material 'Ball' asks for Backfacing: in the fit both sides are as its front is."
     assert (said in export(target).notes) is asked
 

@@ -55,6 +55,17 @@ def test_each_kind_finds_its_own() -> None:
     assert mi.has_flag(found.flags(), mi.BSDFFlags.DiffuseReflection)
 
 
+@pytest.mark.parametrize("side", [1.0, -1.0])
+def test_any_ray_finds_the_back_that_there_is(side: float) -> None:
+    from mfo_backend.material.plugins.ray_kinds import RAYS
+
+    found = by_ray(scattered=WHITE, shadow=WHITE, behind={"type": "null"})
+    for number in range(len(RAYS)):
+        si = surface(number)
+        si.n = mi.Normal3f(0, 0, side)
+        assert_equal(found.eval_null_transmission(si), 0.0 if side > 0.0 else 1.0)
+
+
 @pytest.mark.parametrize(
     ("flag", "kind"),
     [
