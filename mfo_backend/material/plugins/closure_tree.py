@@ -20,6 +20,8 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
+from functools import reduce
+from operator import or_
 from typing import Any
 
 import drjit as dr
@@ -108,10 +110,7 @@ class ClosureTree(mi.BSDF):
         if self.clear:
             components.append(mi.BSDFFlags.Null | both)
         self.m_components = components
-        flags = components[0]
-        for flag in components[1:]:
-            flags |= flag
-        self.m_flags = flags
+        self.m_flags = reduce(or_, components)
 
     def _leaf(self, props: mi.Properties, leaf: str, end: str) -> Leaf:
         """The leaf whose own properties end so."""
@@ -140,7 +139,7 @@ class ClosureTree(mi.BSDF):
         A held material is no part of lanes if it is glass or cut out; what is translucent has lanes on both sides.
         """
         is_grey = [not isinstance(c, mi.Texture) and float(np.ptp(np.ravel(c))) == 0.0 for c, _ in self.clear]
-        return all(is_grey) and not any(leaf.material.is_clear for leaf in self.held)
+        return all(is_grey) and not any(leaf.material.lobes.clear for leaf in self.held)
 
     @property
     def is_translucent(self) -> bool:

@@ -24,7 +24,8 @@ shading frame, dp/du of the UV map.
 from __future__ import annotations
 
 from dataclasses import replace
-from functools import cache
+from functools import cache, reduce
+from operator import or_
 from typing import Any
 
 import drjit as dr
@@ -86,9 +87,7 @@ class BlenderPrincipled(mi.BSDF):
         self._row: NDArray[np.float32] | None = None
         self._choose_lobes()
         # A lobe that is left out keeps its literal values, which the compiler removes
-        for item in BLENDER_PRINCIPLED:
-            if item.name in self.given or item.name in self.free:
-                dr.make_opaque(getattr(self, item.name))
+        dr.make_opaque([getattr(self, name) for name in self.opened])
 
     def _choose_lobes(self) -> None:
         self.lobes = needed_lobes(self.fixed, self.free)
@@ -106,10 +105,7 @@ class BlenderPrincipled(mi.BSDF):
         if self.lobes.anisotropic:
             components = [flag | mi.BSDFFlags.Anisotropic for flag in components]
         self.m_components = components
-        flags = components[0]
-        for flag in components[1:]:
-            flags |= flag
-        self.m_flags = flags
+        self.m_flags = reduce(or_, components)
         # Tables are loaded at their first use, which must not fall into the recording of a rendering kernel
         _load_tables(self.lobes, self.model)
 
@@ -126,8 +122,7 @@ class BlenderPrincipled(mi.BSDF):
         if changed - self.free:
             self.free |= changed
             self._choose_lobes()
-        for name in changed:
-            dr.make_opaque(getattr(self, name))
+        dr.make_opaque([getattr(self, name) for name in changed])
         self._row = None
 
     def emission_share(self, si: mi.SurfaceInteraction3f, active: Any, *, sampled: bool) -> mi.Color3f:
@@ -155,12 +150,7 @@ class BlenderPrincipled(mi.BSDF):
     @property
     def lets_in(self) -> bool:
         """Whether light gets to the other side of the surface."""
-        return self.is_clear or self.is_translucent
-
-    @property
-    def is_clear(self) -> bool:
-        """Whether light goes through it by refraction or holes."""
-        return self.lobes.transmission or self.lobes.alpha
+        return self.lobes.clear or self.is_translucent
 
     @property
     def is_translucent(self) -> bool:

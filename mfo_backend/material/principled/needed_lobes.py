@@ -26,6 +26,11 @@ class Lobes:
     alpha: bool = True
     subsurface: bool = True
 
+    @property
+    def clear(self) -> bool:
+        """Whether light goes through by refraction or holes."""
+        return self.transmission or self.alpha
+
 
 ALL_LOBES = Lobes()
 
