@@ -1,0 +1,115 @@
+# SPDX-License-Identifier: Apache-2.0
+"""A leaf with the sun behind it, and a sign that glows: what is found of their .blend files is in their nodes."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from .conftest import run_bpy, run_mfo
+
+SCENE = """
+import math
+import numpy as np
+bpy.ops.wm.read_factory_settings(use_empty=True)
+scene = bpy.context.scene
+scene.render.engine, scene.cycles.samples, scene.cycles.use_denoising = "CYCLES", 128, False
+scene.render.resolution_x = scene.render.resolution_y = 64
+scene.world = bpy.data.worlds.new("World")
+bpy.ops.mesh.primitive_grid_add(x_subdivisions=2, y_subdivisions=2, size=2.0, rotation=(1.3, 0.0, 0.3))
+sheet = bpy.context.object
+sheet.name = "Sheet"
+material = bpy.data.materials.new("Sheet")
+if material.node_tree is None:
+    material.use_nodes = True
+sheet.data.materials.append(material)
+nodes, links = material.node_tree.nodes, material.node_tree.links
+plastic, out = nodes["Principled BSDF"], nodes["Material Output"]
+bpy.ops.object.light_add(type="SUN", rotation=(-1.2, 0.4, 0.0))
+bpy.context.object.data.energy = 3.0
+bpy.ops.object.light_add(type="AREA", location=(1.5, -2.5, 2.0), rotation=(0.9, 0.0, 0.5))
+bpy.context.object.data.energy = 40.0
+bpy.ops.object.camera_add(location=(0.0, -5.0, 0.3), rotation=(math.radians(87), 0.0, 0.0))
+scene.camera = bpy.context.object
+
+def done(values, start):
+    settings = scene.render.image_settings
+    if hasattr(settings, "media_type"):
+        settings.media_type = "IMAGE"
+    settings.file_format, scene.render.filepath = "OPEN_EXR", argv[1]
+    bpy.ops.render.render(write_still=True)
+    for (place, name), value in zip(values, start):
+        setattr(place, name, value)
+    bpy.ops.wm.save_as_mainfile(filepath=argv[0])
+"""
+LEAF = f"""{SCENE}
+through, mix, noise, ramp = (
+    nodes.new(f"ShaderNode{{kind}}") for kind in ("BsdfTranslucent", "MixShader", "TexNoise", "ValToRGB")
+)
+noise.inputs["Scale"].default_value = 3.0
+low, high = ramp.color_ramp.elements
+low.position, high.position, low.color, high.color = 0.4, 0.6, (0.05, 0.3, 0.04, 1.0), (0.5, 0.45, 0.1, 1.0)
+mix.inputs[0].default_value = 0.6
+for first, second in (
+    (noise.outputs[0], ramp.inputs[0]), (ramp.outputs[0], plastic.inputs["Base Color"]),
+    (ramp.outputs[0], through.inputs["Color"]), (plastic.outputs[0], mix.inputs[1]),
+    (through.outputs[0], mix.inputs[2]), (mix.outputs[0], out.inputs["Surface"]),
+):
+    links.new(first, second)
+grey = (0.3, 0.3, 0.3, 1.0)
+done([(low, "color"), (high, "color"), (mix.inputs[0], "default_value")], [grey, grey, 0.4])
+"""
+SIGN = f"""{SCENE}
+picture = bpy.data.images.new("Sign", 8, 8)
+pixels = np.ones((8, 8, 4), np.float32)
+pixels[..., :3] = np.random.default_rng(3).random((8, 8, 3)) ** 3
+picture.pixels = pixels.ravel()
+picture.pack()
+image = nodes.new("ShaderNodeTexImage")
+image.image = picture
+links.new(image.outputs[0], plastic.inputs["Emission Color"])
+plastic.inputs["Base Color"].default_value = (0.1, 0.2, 0.4, 1.0)
+plastic.inputs["Emission Strength"].default_value = 2.5
+done(
+    [(plastic.inputs["Base Color"], "default_value"), (plastic.inputs["Emission Strength"], "default_value")],
+    [(0.5, 0.5, 0.5, 1.0), float(argv[2])],
+)
+"""
+SHOW = """
+bpy.ops.wm.open_mainfile(filepath=argv[0])
+nodes = bpy.data.objects["Sheet"].active_material.node_tree.nodes
+found = [list(element.color)[:3] for element in nodes["Color Ramp"].color_ramp.elements] + [
+    nodes["Mix Shader"].inputs[0].default_value
+] if "Color Ramp" in nodes else nodes["Principled BSDF"].inputs["Emission Strength"].default_value
+"""
+
+
+def test_what_a_ramp_gives_both_shaders_of_a_leaf_is_found(tmp_path: Path) -> None:
+    start, picture, saved = tmp_path / "start.blend", tmp_path / "leaf.exr", tmp_path / "saved.blend"
+    run_bpy(LEAF, start, picture)
+    names = "Roughness, Color Ramp/Stop 0, Color Ramp/Stop 1, Mix Shader/Factor"
+    done = run_mfo(
+        "blend", start, "--object", "Sheet", "--reference", picture, "--parameters", names,
+        "--out", tmp_path / "job", "--apply", "--save-as", saved, "--json",
+    )  # fmt: skip
+    assert done.code == 0, done.stderr
+    assert done.answer["verdict"] == "same"
+    low, high, factor = run_bpy(SHOW, saved)
+    assert low == pytest.approx([0.05, 0.3, 0.04], abs=0.03)
+    assert high == pytest.approx([0.5, 0.45, 0.1], abs=0.05)
+    assert factor == pytest.approx(0.6, abs=0.05)
+
+
+@pytest.mark.parametrize("strength", [1.0, 0.0])
+def test_the_strength_of_a_glow_by_a_picture_is_found(tmp_path: Path, strength: float) -> None:
+    """From none by the class of materials that glow."""
+    start, picture, saved = tmp_path / "start.blend", tmp_path / "sign.exr", tmp_path / "saved.blend"
+    run_bpy(SIGN, start, picture, strength)
+    done = run_mfo(
+        "blend", start, "--object", "Sheet", "--reference", picture,
+        "--out", tmp_path / "job", "--apply", "--save-as", saved, "--json",
+    )  # fmt: skip
+    assert done.code == 0, done.stderr
+    assert done.answer["verdict"] == "same"
+    assert run_bpy(SHOW, saved) == pytest.approx(2.5, rel=0.02)
