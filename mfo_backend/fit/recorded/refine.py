@@ -126,7 +126,7 @@ def _recorded_near(setting: Setting, stage: Stage, start: Vector, number: int) -
         if not (moved or finer > grid) or number == last or setting.course.should_stop():
             return recording, x, grid
         del few, recording
-        step = _Step.after(step, (x - start) / setting.table.width)
+        step = _Step.after(step if setting.scene.needs.own else None, (x - start) / setting.table.width)
         start, grid = start + step.share * (x - start), finer
 
 
