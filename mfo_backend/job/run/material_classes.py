@@ -41,6 +41,9 @@ _AROUND = (Cause.LIGHT, Cause.SURROUNDINGS, Cause.PICTURE)  # where the surround
 # a metal with a coat and a sheen
 LAYERS, LAYER = ("metallic", "specular_tint", "coat_weight", "sheen_weight"), 0.05
 MANY_LAYERS = 3
+# IOR of a glass that hardly bends light, and may stand for a surface that is cut out. Of a ball with an Alpha of 0.5
+# one of 1.01 (the least) was once *same*, at a FLIP of 0.159 for 0.085, with three wrong values determined
+STRAIGHT = 1.05
 POLISH = "polish"  # a stage that only fits on whole light paths have
 PLAINER = "A plainer material looks the same as one with further layers, so it is the result."
 PLAINER_GLOW = "A plainer material that glows looks the same as one of many layers, so it is the result."
@@ -185,8 +188,15 @@ def is_worth_another(result: FitResult, selection: str | Sequence[str]) -> bool:
     judgement = result.judgement
     if judgement is None or selection != "all" or result.model != "blender_principled":
         return False
+    if judgement.verdict is Verdict.SAME:
+        return _is_straight_glass(result)
     # another class has another shadow, too, so light may seem to be the cause
-    return judgement.verdict is not Verdict.SAME and judgement.cause not in (Cause.PICTURE, Cause.NOISE)
+    return judgement.cause not in (Cause.PICTURE, Cause.NOISE)
+
+
+def _is_straight_glass(result: FitResult) -> bool:
+    values = {name: float(np.ravel(result.recovered.get(name, 0.0))[0]) for name in _OF_GLASS}
+    return values["transmission_weight"] > LAYER and 0.0 < values["ior"] < STRAIGHT
 
 
 def with_values_of(other: MaterialClass, result: FitResult, material: Mapping[str, Any]) -> FitResult:

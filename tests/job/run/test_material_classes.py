@@ -99,9 +99,14 @@ def test_a_cut_out_fits_how_much_there_is_of_it_but_no_glass():
 
 
 def test_another_class_is_worth_it_where_the_material_may_be_wrong():
+    """A glass that bends nothing may be a surface that is cut out, though it is the same."""
     wrong = judgement(Verdict.DIFFERENT, Cause.MATERIAL)
     assert is_worth_another(result(wrong), "all")
-    assert not is_worth_another(result(judgement(Verdict.SAME)), "all")
+    same = SimpleNamespace(judgement=judgement(Verdict.SAME), model="blender_principled", recovered={})
+    assert not is_worth_another(same, "all")
+    for ior, is_straight in ((1.01, True), (1.45, False)):
+        same.recovered = {"transmission_weight": 0.68, "ior": ior}
+        assert is_worth_another(same, "all") is is_straight
     assert not is_worth_another(result(judgement(Verdict.DIFFERENT, Cause.PICTURE)), "all")
     assert not is_worth_another(result(judgement(Verdict.CLOSE, Cause.NOISE)), "all")
     assert not is_worth_another(result(None), "all")
