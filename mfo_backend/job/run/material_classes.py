@@ -41,8 +41,8 @@ _AROUND = (Cause.LIGHT, Cause.SURROUNDINGS, Cause.PICTURE)  # where the surround
 # a metal with a coat and a sheen
 LAYERS, LAYER = ("metallic", "specular_tint", "coat_weight", "sheen_weight"), 0.05
 MANY_LAYERS = 3
-# IOR of a glass that hardly bends light, and may stand for a surface that is cut out. Of a ball with an Alpha of 0.5
-# one of 1.01 (the least) was once *same*, at a FLIP of 0.159 for 0.085, with three wrong values determined
+# IOR of a glass that hardly bends light, and may stand for a surface that is cut out. One of 1.01 (the least) is 0.07
+# FLIP from a ball with an Alpha of 0.5, *close*, and most likely was *same* once (docs/bench/README.md)
 STRAIGHT = 1.05
 POLISH = "polish"  # a stage that only fits on whole light paths have
 PLAINER = "A plainer material looks the same as one with further layers, so it is the result."
