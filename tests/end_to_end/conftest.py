@@ -55,13 +55,26 @@ def run_mfo(*arguments: object, environment: dict[str, str] | None = None) -> Do
 def run_bpy(code: str, *arguments: object) -> Any:
     """Run a script that opens or builds its scene with the bpy module in this process; returns what it calls `found`.
 
-    `argv` are its arguments.
+    `argv` are its arguments, and `render` is `_render`.
     """
     import bpy
 
-    names = {"bpy": bpy, "argv": [str(each) for each in arguments]}
+    names: dict[str, Any] = {"bpy": bpy, "argv": [str(each) for each in arguments], "render": _render}
     exec(compile(code, "<script>", "exec"), names)
     return names.get("found")
+
+
+def _render(path: str, samples: int, file_format: str = "OPEN_EXR", color_mode: str = "RGB") -> None:
+    """Have Cycles write a picture of the scene."""
+    import bpy
+
+    scene = bpy.context.scene
+    scene.cycles.samples, scene.cycles.seed, scene.render.filepath = samples, 5, path
+    settings = scene.render.image_settings
+    if hasattr(settings, "media_type"):
+        settings.media_type = "IMAGE"
+    settings.file_format, settings.color_mode = file_format, color_mode
+    bpy.ops.render.render(write_still=True)
 
 
 def run_headless(*words: object) -> Done:

@@ -30,12 +30,7 @@ pane.modifiers.new("Thickness", "SOLIDIFY").thickness = 0.02
 bpy.context.view_layer.objects.active = target
 bpy.ops.wm.save_as_mainfile(filepath=argv[1])
 if argv[2]:
-    scene.cycles.samples, scene.cycles.seed = 128, 5
-    settings = scene.render.image_settings
-    if hasattr(settings, "media_type"):
-        settings.media_type = "IMAGE"
-    settings.file_format, scene.render.filepath = "OPEN_EXR", argv[2]
-    bpy.ops.render.render(write_still=True)
+    render(argv[2], 128)
 """
 
 

@@ -17,16 +17,11 @@ BUILD = """
 import json
 truth, begin = map(json.loads, argv[4:])
 bpy.ops.wm.open_mainfile(filepath=argv[0])
-scene, target = bpy.context.scene, bpy.data.objects[argv[1]]
+target = bpy.data.objects[argv[1]]
 shader = next(n for n in target.active_material.node_tree.nodes if n.type == "BSDF_PRINCIPLED")
 for name, value in truth.items():
     shader.inputs[name].default_value = value
-scene.cycles.samples, scene.cycles.seed = 128, 5
-settings = scene.render.image_settings
-if hasattr(settings, "media_type"):
-    settings.media_type = "IMAGE"
-settings.file_format, scene.render.filepath = "OPEN_EXR", argv[2]
-bpy.ops.render.render(write_still=True)
+render(argv[2], 128)
 for name, value in begin.items():
     shader.inputs[name].default_value = value
 bpy.ops.wm.save_as_mainfile(filepath=argv[3])
@@ -80,13 +75,7 @@ values = {"Base Color": (0.8, 0.65, 0.5, 1.0), "Metallic": 1.0, "Roughness": flo
           "Coat Weight": 0.0, "Sheen Weight": 0.0}
 for name, value in values.items():
     node.inputs[name].default_value = value
-scene = bpy.context.scene
-scene.cycles.samples, scene.cycles.seed = 256, 5
-settings = scene.render.image_settings
-if hasattr(settings, "media_type"):
-    settings.media_type = "IMAGE"
-settings.file_format, scene.render.filepath = "OPEN_EXR", argv[1]
-bpy.ops.render.render(write_still=True)
+render(argv[1], 256)
 """
 
 

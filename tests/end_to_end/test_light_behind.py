@@ -14,7 +14,7 @@ import math
 import numpy as np
 bpy.ops.wm.read_factory_settings(use_empty=True)
 scene = bpy.context.scene
-scene.render.engine, scene.cycles.samples, scene.cycles.use_denoising = "CYCLES", 128, False
+scene.render.engine, scene.cycles.use_denoising = "CYCLES", False
 scene.render.resolution_x = scene.render.resolution_y = 64
 scene.world = bpy.data.worlds.new("World")
 bpy.ops.mesh.primitive_grid_add(x_subdivisions=2, y_subdivisions=2, size=2.0, rotation=(1.3, 0.0, 0.3))
@@ -34,11 +34,7 @@ bpy.ops.object.camera_add(location=(0.0, -5.0, 0.3), rotation=(math.radians(87),
 scene.camera = bpy.context.object
 
 def done(values, start):
-    settings = scene.render.image_settings
-    if hasattr(settings, "media_type"):
-        settings.media_type = "IMAGE"
-    settings.file_format, scene.render.filepath = "OPEN_EXR", argv[1]
-    bpy.ops.render.render(write_still=True)
+    render(argv[1], 128)
     for (place, name), value in zip(values, start):
         setattr(place, name, value)
     bpy.ops.wm.save_as_mainfile(filepath=argv[0])

@@ -16,13 +16,7 @@ scene = bpy.context.scene
 scene.render.film_transparent = True
 bpy.ops.wm.save_as_mainfile(filepath=argv[1])
 if argv[2]:
-    scene.cycles.samples, scene.cycles.seed = 256, 5
-    settings = scene.render.image_settings
-    if hasattr(settings, "media_type"):
-        settings.media_type = "IMAGE"
-    settings.file_format, settings.color_mode = ("TIFF" if argv[2].endswith(".tif") else "PNG"), "RGBA"
-    scene.render.filepath = argv[2]
-    bpy.ops.render.render(write_still=True)
+    render(argv[2], 256, "TIFF" if argv[2].endswith(".tif") else "PNG", "RGBA")
 """
 
 

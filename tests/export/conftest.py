@@ -104,6 +104,23 @@ def export(tmp_path: Path) -> Callable[..., Any]:
 
 
 @pytest.fixture
+def in_both(export: Callable[..., Any], render_cycles: Callable[[], Pixels]) -> Callable[[Any], tuple[Any, Any, Any]]:
+    """The report of a target's export, our picture of the scene by it, and that by Cycles."""
+
+    def run(target: Any) -> tuple[Any, Any, Any]:
+        import bpy
+
+        from studies.parity.cycles_parity import render_job
+
+        bpy.context.view_layer.update()
+        theirs = render_cycles()
+        report = export(target, reference=bpy.data.images.new("Any", 32, 32))
+        return report, np.mean(render_job(report.folder, 256), axis=0), theirs
+
+    return run
+
+
+@pytest.fixture
 def render_mitsuba(mitsuba: Any) -> Callable[..., Pixels]:
     def render(report: Any, spp: int = 64) -> Pixels:
         """Return what `mi.render` makes of the job's scene, with our lamps registered."""

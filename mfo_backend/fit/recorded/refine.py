@@ -36,7 +36,6 @@ NOISIER = 1.25
 # without it, are 0.9 % off; with twice as much 1.1 % (docs/notebook/several_materials.md). Smaller: recordings that
 # follow noise.
 OWN_LIGHT = 0.01
-TINY = 1e-30  # of a square that may be 0
 
 
 @dataclass(frozen=True, eq=False)
@@ -148,8 +147,8 @@ class _Step:
         if last is None:
             return _Step(away, 1.0)
         turn = away - last.away
-        share = -last.share * float(np.dot(last.away, turn)) / max(float(np.dot(turn, turn)), TINY)
-        return _Step(away, min(share, 1.0) if share > 0.0 else 1.0)
+        back = -last.share * float(np.dot(last.away, turn))  # not above 0 where the way goes on
+        return _Step(away, min(back / float(np.dot(turn, turn)), 1.0) if back > 0.0 else 1.0)
 
 
 def _is_old(change: float, indirect: float) -> bool:

@@ -16,8 +16,8 @@ import mitsuba as mi
 # Of the samples, about the normal of a coat. A coat's bump was 0.79 % too dark without and 0.36 % with it (96 x 96,
 # docs/notebook/graph_values.md); other shares were not tried. Larger: what is below the coat has more noise.
 COAT_SHARE = 0.2
-# Of the samples, to the other side of a surface whose light comes through. Other shares were not tried. Larger: what
-# reflects has more noise.
+# Of the samples, to the other side of a surface whose light comes through. A leaf before a sun and a lamp has 14 and
+# 5 % of noise in a pixel with 0.25 and with 0.4, a tenth more with 0.6. Larger: what reflects has more noise.
 THROUGH_SHARE = 0.4
 LEAST_ROUGHNESS, ROUGH_COAT = 0.03, 0.1  # the least of a narrow lobe, and a coat's where nodes give it. No measurement
 

@@ -98,9 +98,7 @@ def test_bumps_on_instances_of_many_sizes_are_baked_for_some_and_named(
     assert [said in note for note in report.notes].count(True) == 1
 
 
-def test_waves_that_are_narrower_than_a_texel_are_baked_finer(
-    scene: Any, export: Any, render_cycles: Callable[[], np.ndarray]
-) -> None:
+def test_waves_that_are_narrower_than_a_texel_are_baked_finer(scene: Any, in_both: Any) -> None:
     """Slopes of up to 9 that turn within six texels: by their means the floor was 9 % too bright."""
     scene.cycles.samples = 256
     add_camera("ORTHO", ortho_scale=4.0)
@@ -111,8 +109,7 @@ def test_waves_that_are_narrower_than_a_texel_are_baked_finer(
     waves.inputs["Scale"].default_value, bump.inputs["Distance"].default_value = 12.0, 0.3
     nodes.tree.links.new(waves.outputs["Fac"], bump.inputs["Height"])
     nodes.tree.links.new(bump.outputs[0], nodes.principled.inputs["Normal"])
-    theirs = render_cycles()
-    ours = np.mean(render_job(export(target, reference=bpy.data.images.new("Any", 32, 32)).folder, 256), axis=0)
+    _, ours, theirs = in_both(target)
     assert ours[:8].mean() == pytest.approx(theirs[:8].mean(), rel=0.02)
 
 
@@ -170,9 +167,7 @@ def test_a_displacement_by_bump_takes_the_place_of_the_smooth_normal_and_a_bump_
 
 @pytest.mark.parametrize("kind", ["NormalMap", "Position", "Object", "Generated", "UV", "attribute", "BUMP by UV"])
 @pytest.mark.parametrize("is_behind", [False, True])
-def test_normals_of_a_floor_that_is_seen_from_behind(
-    scene: Any, export: Any, render_cycles: Any, kind: str, is_behind: bool
-) -> None:
+def test_normals_of_a_floor_that_is_seen_from_behind(scene: Any, in_both: Any, kind: str, is_behind: bool) -> None:
     """Cycles turns those of a Normal Map round on back faces: a floor with its normals down was 16 % too bright.
 
     So it does with heights between vertices, and not with those by the place: such floors were 79 % too dark.
@@ -189,10 +184,7 @@ def test_normals_of_a_floor_that_is_seen_from_behind(
     )
     if is_behind:
         floor.data.flip_normals()
-    bpy.context.view_layer.update()
-    theirs = render_cycles()
-    report = export(target, reference=bpy.data.images.new("Any", 32, 32))
-    ours = np.mean(render_job(report.folder, 256), axis=0)
+    report, ours, theirs = in_both(target)
     assert ours[:8].mean() == pytest.approx(theirs[:8].mean(), rel=0.01)
     turned = [m.get("turned", False) for m in report.request["materials"].values()]
     assert any(turned) == (kind not in ("Position", "Object"))

@@ -349,7 +349,7 @@ SHEETS = {"a leaf": LEAF, "a bumped leaf": mix(0.4, bumped(PLASTIC, 2.0), TRANSL
 def test_recorded_light_from_behind_comes_through_a_sheet_as_in_cycles(
     scene: Any, export: Any, render_cycles: Any, mitsuba: Any, name: str, light: str
 ) -> None:
-    """A sheet with two free shaders before a wall; without its lanes of the far side it is 60 % too dark and more."""
+    """A sheet with two free shaders before a wall; without its lanes of the far side it is 30 to 78 % too dark."""
     from mfo_backend.render.paths.recorded_scene import RecordedScene
 
     from ..scenes import add_light, add_quad, diffuse_material

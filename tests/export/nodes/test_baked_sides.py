@@ -9,8 +9,6 @@ import bpy
 import numpy as np
 import pytest
 
-from studies.parity.cycles_parity import render_job
-
 from ..scene.test_baked_surfaces import Nodes
 from ..scenes import add_camera, add_light, add_quad, new_material
 
@@ -52,36 +50,27 @@ def lit(scene: Any) -> Any:
 
 @pytest.mark.parametrize("is_behind", [False, True])
 @pytest.mark.parametrize("kind", KINDS)
-def test_a_floor_that_is_seen_from_behind(
-    scene: Any, export: Any, render_cycles: Any, kind: str, is_behind: bool
-) -> None:
+def test_a_floor_that_is_seen_from_behind(scene: Any, in_both: Any, kind: str, is_behind: bool) -> None:
     target, floor = lit(scene), add_quad("Floor", 4.0, 0.0, new_material("Floor"))
     uv = floor.data.uv_layers.new(name="UVMap")
     uv.uv.foreach_set("vector", np.float32([0.1, 0.2, 0.8, 0.2, 0.8, 0.9, 0.1, 0.9]))
     tell_sides(floor.data.materials[0], kind)
     if is_behind:
         floor.data.flip_normals()
-    bpy.context.view_layer.update()
-    theirs = render_cycles()
-    report = export(target, reference=bpy.data.images.new("Any", 32, 32))
-    ours = np.mean(render_job(report.folder, 256), axis=0)
+    report, ours, theirs = in_both(target)
     assert looks(report) == 1
     assert ours[:16].mean(axis=(0, 1)) == pytest.approx(theirs[:16].mean(axis=(0, 1)), rel=0.01)
     assert not any("Backfacing" in note for note in report.notes)
 
 
 @pytest.mark.parametrize("is_clear", [False, True])
-def test_the_back_of_a_box_is_baked_where_light_gets_in(
-    scene: Any, export: Any, render_cycles: Any, is_clear: bool
-) -> None:
+def test_the_back_of_a_box_is_baked_where_light_gets_in(scene: Any, in_both: Any, is_clear: bool) -> None:
     target = lit(scene)
     bpy.ops.mesh.primitive_cube_add(size=2.0, location=(-0.5, 0.5, -1.0))
     box = bpy.context.object
     box.data.materials.append(new_material("Box", Alpha=0.5 if is_clear else 1.0))
     tell_sides(box.data.materials[0], "Backfacing")
-    theirs = render_cycles()
-    report = export(target, reference=bpy.data.images.new("Any", 32, 32))
-    ours = np.mean(render_job(report.folder, 256), axis=0)
+    report, ours, theirs = in_both(target)
     assert looks(report) == is_clear
     assert ours[:16].mean(axis=(0, 1)) == pytest.approx(theirs[:16].mean(axis=(0, 1)), rel=0.015)
 
