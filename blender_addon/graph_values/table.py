@@ -34,9 +34,9 @@ from .ranges import (
 )
 from .tint import IMAGE, TINT_GAIN, TINT_OFFSET, is_tint, tint_of
 
-# what a fit on recorded light does not change: light that the target emits, and what lets light through
+# what no fit of values inside nodes changes: what lets light through, and of a mix the light that it emits
+LETS_THROUGH = ("Alpha", "Transmission Weight")
 EMISSION = ("Emission Color", "Emission Strength")
-NOT_FITTED = (*EMISSION, "Alpha", "Transmission Weight")
 VALUE_NODE = "ShaderNodeValue"
 WEIGHT = "Weight"  # the share of a shader in a mix, among the names of its sockets
 MOST = 256  # values of one graph; what lies further upstream is not offered
@@ -123,7 +123,8 @@ def _reached(target: TargetShader) -> Iterator[tuple[str, str, SocketPlace]]:
     the weight of a shader hangs on.
     """
     if not target.is_mixed:
-        yield from ((name, name, place) for name, place in target.places.items() if _is_free(name, place))
+        glow = () if _is_dark(target) else EMISSION
+        yield from ((name, name, place) for name, place in target.places.items() if _is_free(name, place, glow))
         return
     reflecting = [leaf for leaf in target.others if leaf.node.bl_idname in KINDS]
     leaves = [(f"{number}/", leaf) for number, leaf in enumerate(reflecting)]
@@ -136,8 +137,8 @@ def _reached(target: TargetShader) -> Iterator[tuple[str, str, SocketPlace]]:
         yield from ((f"{before}{WEIGHT}", label, place) for place in _factors_of(leaf))
 
 
-def _is_free(name: str, place: SocketPlace) -> bool:
-    return name not in (*NOT_FITTED, *UNUSED_SOCKETS) and place.socket.is_linked
+def _is_free(name: str, place: SocketPlace, glow: Sequence[str] = ()) -> bool:
+    return place.socket.is_linked and name not in {*LETS_THROUGH, *UNUSED_SOCKETS, *EMISSION}.difference(glow)
 
 
 def _factors_of(leaf: ClosureLeaf) -> list[SocketPlace]:
@@ -153,7 +154,10 @@ def _held(target: TargetShader) -> Iterator[SocketPlace]:
     if displacement is not None:
         yield SocketPlace(displacement, ())
     for leaf in (target.leaf, *target.others):
-        yield from _held_places(TargetShader(leaf)) if leaf.node.bl_idname in KINDS else ()
+        shader = TargetShader(leaf)
+        glow = () if _is_dark(shader) or not target.is_mixed else EMISSION
+        places = shader.places if leaf.node.bl_idname in KINDS else {}
+        yield from (places[name] for name in (*LETS_THROUGH, *glow) if name in places and places[name].socket.is_linked)
     for leaf in (target.leaf, *target.others) if target.is_mixed else ():
         directions = (leaf.node.inputs.get(name) for name in DIRECTIONS)
         yield from (SocketPlace(socket, leaf.groups) for socket in directions if socket is not None)
@@ -163,14 +167,10 @@ def _held(target: TargetShader) -> Iterator[SocketPlace]:
             yield from _factors_of(leaf)
 
 
-def _held_places(shader: TargetShader) -> Iterator[SocketPlace]:
-    """The linked sockets of a shader that no fit with values of nodes changes; of a shader that is dark no glow."""
-    places = shader.places
-    strength = places.get("Emission Strength")
-    is_dark = strength is not None and not strength.socket.is_linked and plain_value(strength.socket) == 0.0
-    for name in NOT_FITTED:
-        if name in places and places[name].socket.is_linked and not (is_dark and name in EMISSION):
-            yield places[name]
+def _is_dark(shader: TargetShader) -> bool:
+    """Whether a shader has no light of its own, whatever its colour is."""
+    strength = shader.places.get("Emission Strength")
+    return strength is None or (not strength.socket.is_linked and plain_value(strength.socket) == 0.0)
 
 
 def named(values: Sequence[Named], wanted: Sequence[str]) -> list[Named]:

@@ -111,19 +111,13 @@ class BlenderPrincipledModel:
 class InnerLightModel(BlenderPrincipledModel):
     """Blender's Principled BSDF with light from inside, which it sends to the view without a `wo`: (0, 0, 0).
 
-    That is its own where it `glows`, 1 unless it is free, for a recording has its radiance. Where light `walks` below
-    the surface, a lane whose walk has a length is of that.
+    That is its own where it `glows`, and where light `walks` below the surface, that of a lane whose walk has a length.
     """
 
     def __init__(self, cycles: CyclesModel = BLENDER_5_0, *, normals: ParameterTable, glows: bool, walks: bool) -> None:
         super().__init__(cycles, normals=normals)
         self._glows = glows
         self.walks = WALK if walks else NO_WALK
-
-    def values(self, given: Mapping[str, Value | None], free: Collection[str]) -> dict[str, Value | None]:
-        """See `RecordedModel`."""
-        unit = {"emission_color": (1.0, 1.0, 1.0), "emission_strength": 1.0} if self._glows else {}
-        return super().values(given, free) | {name: value for name, value in unit.items() if name not in free}
 
     def bind(self, fixed: Mapping[str, Value | None], free: Collection[str]) -> Evaluate:
         """See `RecordedModel`."""

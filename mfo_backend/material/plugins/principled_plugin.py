@@ -16,9 +16,9 @@ of rough glass leads to do not count there. `mi.traverse` shows
 `<id>.base_color`, `<id>.roughness`, ...; textures as `<id>.<name>.data`. `normal`, `coat_normal` and `tangent` may be
 textures of world directions on the camera's side, zero for the mesh's own.
 
-A Mitsuba BSDF cannot emit. An emitting material needs a `blender_glow` emitter of radiance emission_color *
-emission_strength, which asks `emission_share` what alpha, sheen and coat leave of it. The tangent is that of Mitsuba's
-shading frame, dp/du of the UV map.
+A Mitsuba BSDF cannot emit. An emitting material needs a `blender_glow` emitter, which asks what is `emitted`, or of a
+radiance of its own the `emission_share` that alpha, sheen and coat leave. The tangent is that of Mitsuba's shading
+frame, dp/du of the UV map.
 """
 
 from __future__ import annotations
@@ -127,10 +127,13 @@ class BlenderPrincipled(mi.BSDF):
 
     def emission_share(self, si: mi.SurfaceInteraction3f, active: Any, *, sampled: bool) -> mi.Color3f:
         """What alpha, sheen and coat leave of the surface's own light towards `si.wi`, perhaps to a light sample."""
-        own = {"emission_color": mi.Color3f(1.0), "emission_strength": mi.Float(1.0)}
+        return self.emitted(si, active, sampled=sampled, emission_color=mi.Color3f(1), emission_strength=mi.Float(1))
+
+    def emitted(self, si: mi.SurfaceInteraction3f, active: Any, *, sampled: bool, **instead: Any) -> mi.Color3f:
+        """The surface's own light towards `si.wi`, perhaps to a light sample, with the values `instead` of its own."""
         if sampled and not self.model.samples_see_layers:
-            return mi.Color3f(sampled_emission(self.values_at(si, active) | own, si.wi, self.lobes))
-        return mi.Color3f(self.layers_at(si, active, **own).layers.emission)
+            return mi.Color3f(sampled_emission(self.values_at(si, active) | instead, si.wi, self.lobes))
+        return mi.Color3f(self.layers_at(si, active, **instead).layers.emission)
 
     @property
     def bumped(self) -> bool:

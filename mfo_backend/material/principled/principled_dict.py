@@ -151,13 +151,6 @@ def leaf_radiance_dict(material: Mapping[str, Any], scale: float) -> dict[str, A
     return result
 
 
-def unit_radiance_dict(material: Mapping[str, Any], scale: float) -> dict[str, Any]:
-    """Properties of the same texture for a material of one shader, whose strength is `scale`."""
-    color = material["sockets"].get("Emission Color", {"value": _EMISSION["Emission Color"]})
-    of_one = {"color_0": _amount(color), "strength_0": 1.0, "weight_0": 1.0}
-    return {"type": "leaf_radiance", "scale": scale} | of_one
-
-
 def _emits(sockets: Mapping[str, Mapping[str, Any]]) -> bool:
     strength = sockets.get("Emission Strength", {"value": 0.0})
     return bool(strength.get("graph") or strength.get("texture") or strength.get("value"))

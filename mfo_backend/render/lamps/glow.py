@@ -23,18 +23,19 @@ from .face_points import FacePoints
 
 
 class Glow(mi.Emitter):
-    """Properties: `radiance`, linear Rec.709, a colour or a texture over the shape it belongs to, times `strength` (1).
+    """Properties: `radiance`, linear Rec.709, a colour or a texture over the shape it belongs to.
 
     `layered` (false) is whether what the shape's BSDF has above takes its part of that, by its `emission_share`, else
-    by alpha. `free` is which of the two a fit changes, if any: "radiance" or "strength".
+    by alpha. What is `of_surface` (false) has no radiance of its own: it is what the BSDF says that it has `emitted`,
+    times `scale` (1), so that whoever changes the BSDF changes the light.
     """
 
     def __init__(self, props: mi.Properties) -> None:
         super().__init__(props)
         self.radiance = props.get_emissive_texture("radiance", 1.0)
-        self.strength = dr.opaque(mi.Float, float(props.get("strength", 1.0)))
-        self.layered = bool(props.get("layered", False))
-        self.free = str(props.get("free", ""))
+        self.scale = dr.opaque(mi.Float, float(props.get("scale", 1.0)))
+        self.of_surface = bool(props.get("of_surface", False))
+        self.layered = self.of_surface or bool(props.get("layered", False))
         self.m_flags = +mi.EmitterFlags.Surface
         if self.radiance.is_spatially_varying():
             self.m_flags |= +mi.EmitterFlags.SpatiallyVarying
@@ -42,17 +43,18 @@ class Glow(mi.Emitter):
     def traverse(self, callback: Any) -> None:
         """See `mi.Object`."""
         callback.put("radiance", self.radiance, mi.ParamFlags.Differentiable)
-        callback.put("strength", self.strength, mi.ParamFlags.Differentiable)
-
-    def parameters_changed(self, keys: Any = ()) -> None:
-        """Keep the strength what no kernel knows."""
-        dr.make_opaque(self.strength)
 
     def eval(self, si: mi.SurfaceInteraction3f, active: Any = True) -> mi.Color3f:
         """See `mi.Emitter`."""
-        return dr.select(active, self.radiance.eval(si, active) * self.strength * self.share(si, active), 0.0)
+        return dr.select(active, self._sent(si, active, sampled=False), 0.0)
 
-    def share(self, si: mi.SurfaceInteraction3f, active: Any = True, *, sampled: bool = False) -> mi.Color3f:
+    def _sent(self, si: mi.SurfaceInteraction3f, active: Any, *, sampled: bool) -> mi.Color3f:
+        """The radiance towards `si.wi`, perhaps to a point that has `sampled` the light."""
+        if self.of_surface:
+            return self.get_shape().bsdf().emitted(si, active, sampled=sampled) * self.scale
+        return self.radiance.eval(si, active) * self._share(si, active, sampled=sampled)
+
+    def _share(self, si: mi.SurfaceInteraction3f, active: Any = True, *, sampled: bool) -> mi.Color3f:
         """What layers above leave of the radiance towards the view, or towards a point that has `sampled` the light."""
         if not self.layered:
             return mi.Color3f(1.0)
@@ -62,9 +64,8 @@ class Glow(mi.Emitter):
         return 1.0 - mi.Color3f(bsdf.eval_null_transmission(si, active))
 
     def unlayered(self, si: mi.SurfaceInteraction3f, active: Any = True) -> mi.Color3f:
-        """What is sent out below all layers, of a free factor of 1."""
-        held = mi.Color3f(1.0) if self.free == "radiance" else mi.Color3f(self.radiance.eval(si, active))
-        return held if self.free == "strength" else held * self.strength
+        """What is sent out below all layers, of an emission of the BSDF of 1 where it is that."""
+        return mi.Color3f(self.scale if self.of_surface else self.radiance.eval(si, active))
 
     def sample_direction(
         self, it: mi.Interaction3f, sample: mi.Point2f, active: Any = True
@@ -85,8 +86,7 @@ class Glow(mi.Emitter):
         """See `mi.Emitter`."""
         si = mi.SurfaceInteraction3f(ds, it.wavelengths)
         si.wi = si.to_local(-ds.d)
-        sent = self.radiance.eval(si, active) * self.strength
-        return dr.select(active, sent * self.share(si, active, sampled=True), 0.0)
+        return dr.select(active, self._sent(si, active, sampled=True), 0.0)
 
     @cached_property
     def _points(self) -> FacePoints | None:

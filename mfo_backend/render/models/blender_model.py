@@ -21,13 +21,12 @@ from ...material.principled.principled_dict import (
     is_mixed,
     leaf_radiance_dict,
     socket_value,
-    unit_radiance_dict,
 )
 from ...material.principled.principled_parameters import PARAMETER_OF_SOCKET, SOCKET_OF_PARAMETER
 from ...scene.scene_xml import Element, Target
 from ...types.errors import BadInputError
 from ...types.parameter import ParameterTable, Value
-from .prepared_material import GLOW_KEYS, Materials, PreparedMaterial
+from .prepared_material import Materials, PreparedMaterial
 
 # How far light may go below a surface, of a fit: so many times less or more than the least or largest radius of the
 # scene, for walks that were made for that tell of it. From four times too small a red radius was found
@@ -35,7 +34,8 @@ from .prepared_material import GLOW_KEYS, Materials, PreparedMaterial
 WALKS_NEAR = 5.0
 # Density of a volume and the strength of a glow: at most so many times that of the scene, for both may be any number
 DENSITY = "absorption_density"
-COLOR, STRENGTH = GLOW_KEYS
+STRENGTH = "emission_strength"
+GLOW = {"emission_color", STRENGTH}
 WALK_SIZES, LEAST_SIZE = ("subsurface_radius", "subsurface_scale"), 1e-4
 SOCKETS = frozenset(PARAMETER_OF_SOCKET)
 _VERSION = (5, 0)  # of a job that does not say which Blender it comes from
@@ -157,13 +157,12 @@ def _put_material(
 ) -> None:
     """Make a BSDF the plugin of a material; what has a `start` is open to change."""
     bsdf_id, version = bsdf.get("id", ""), material.get("blender_version", _VERSION)
-    free = [name for name in start if name not in GLOW_KEYS]
     opened = {SOCKET_OF_PARAMETER[name]: {"value": value} for name, value in start.items()}
     properties = blender_principled_dict(
-        dict(material["sockets"]) | (opened if free else {}),
+        dict(material["sockets"]) | opened,
         distribution=material.get("distribution", "MULTI_GGX"),
         version=version,
-        free=free,
+        free=list(start),
         shader=material.get("shader", "principled"),
         subsurface_method=material.get("subsurface_method", "RANDOM_WALK"),
     )
@@ -172,10 +171,8 @@ def _put_material(
     _rewrite(bsdf, properties, textures)
     bsdf.set("id", bsdf_id)
     radiance = leaf_radiance_dict(material, material.get("film_exposure", 1.0))
-    if radiance is not None and (COLOR in start or (STRENGTH in start and is_mixed(material))):
-        raise BadInputError(
-            "The emission of a mix is held, and the colour of one that nodes give: leave them out of the parameters."
-        )
+    if radiance is not None and is_mixed(material) and GLOW & start.keys():
+        raise BadInputError("The emission of a mix is held: leave it out of the parameters.")
     if radiance is not None:
         _replace_radiance(scene, bsdf_id, radiance, textures)
 
@@ -191,9 +188,9 @@ def _prepared(
     """What the renderer is told of a target whose BSDF has been put."""
     outer, mix = target.outer, mix_values(material)
     of_fitted = "fitted." if is_mixed(material) else ""
-    key_ends = {name: GLOW_KEYS.get(name, f"{of_fitted}{name}") for name in table.names}
-    if COLOR in table.names or STRENGTH in table.names:
-        _open_emission(scene, target.shape_id, table.unpack(start), material, textures)
+    key_ends = {name: f"{of_fitted}{name}" for name in table.names}
+    if GLOW & {*table.names, *material.get("varying", ())} and not is_mixed(material):
+        _open_emission(scene, target, material.get("film_exposure", 1.0))
     if mix is not None:
         sizes = [shown for names in mix.leaves.values() for name, shown in names.items() if name in WALK_SIZES]
         others = _near_walks(ParameterTable(mix.parameters), mix.start, sizes)
@@ -203,30 +200,20 @@ def _prepared(
     return PreparedMaterial(table, start, outer_target, key_ends, mix)
 
 
-def _open_emission(
-    scene: Element,
-    shape_id: str,
-    start: Mapping[str, Value],
-    material: Mapping[str, Any],
-    textures: Mapping[str, Element],
-) -> None:
-    """Let the shape glow with the material's emission, whose colour or strength begins at `start`, and no other."""
-    shape = next(shape for shape in scene.iter("shape") if shape.get("id") == shape_id)
-    for emitter in shape.findall("emitter"):
-        shape.remove(emitter)
-    emitter = ElementTree.SubElement(shape, "emitter", type="blender_glow")
-    exposure = material.get("film_exposure", 1.0)
-    if COLOR in start:
-        color = ", ".join(repr(float(v)) for v in np.ravel(start[COLOR]))
-        ElementTree.SubElement(emitter, "rgb", name="radiance", value=color)
-        strength = exposure * float(np.ravel(_constants(material["sockets"])[STRENGTH])[0])
-    else:
-        texture = ElementTree.SubElement(emitter, "texture", name="radiance")
-        _rewrite(texture, unit_radiance_dict(material, exposure), textures)
-        strength = float(np.ravel(start[STRENGTH])[0])
-    ElementTree.SubElement(emitter, "float", name="strength", value=repr(strength))
-    ElementTree.SubElement(emitter, "boolean", name="layered", value="true")
-    ElementTree.SubElement(emitter, "string", name="free", value="radiance" if COLOR in start else "strength")
+def _open_emission(scene: Element, target: Target, exposure: float) -> None:
+    """Let what has the target's material glow with the emission that its BSDF has at any time, and with no other."""
+    for shape in scene.iter("shape"):
+        if shape.get("id") != target.shape_id and not _has_material(shape, target.bsdf_id):
+            continue
+        for emitter in shape.findall("emitter"):
+            shape.remove(emitter)
+        emitter = ElementTree.SubElement(shape, "emitter", type="blender_glow")
+        ElementTree.SubElement(emitter, "boolean", name="of_surface", value="true")
+        ElementTree.SubElement(emitter, "float", name="scale", value=repr(exposure))
+
+
+def _has_material(shape: Element, bsdf_id: str) -> bool:
+    return any(ref.get("id") == bsdf_id for ref in shape.findall("ref"))
 
 
 def _replace_radiance(
@@ -234,7 +221,7 @@ def _replace_radiance(
 ) -> None:
     """Let shapes of a material emit what varies over it, where they emit."""
     for shape in scene.findall("shape"):
-        if not any(ref.get("id") == bsdf_id for ref in shape.findall("ref")):
+        if not _has_material(shape, bsdf_id):
             continue
         for emitter in shape.findall("emitter"):
             for child in list(emitter):

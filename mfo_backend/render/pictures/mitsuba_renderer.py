@@ -15,7 +15,7 @@ from xml.etree import ElementTree
 import numpy as np
 from numpy.typing import NDArray
 
-from ...scene.scene_xml import Element, find_target, prepare_for_fit, read_scene, to_mitsuba_text
+from ...scene.scene_xml import Element, Target, find_target, prepare_for_fit, read_scene, to_mitsuba_text
 from ...types.errors import BadInputError
 from ...types.image import Pixels, Pullback
 from ...types.light_paths import LightPaths
@@ -27,7 +27,7 @@ from ..models.finer_pictures import Shown
 from ..models.graph_pictures import GraphPictures
 from ..models.leaning_normals import tell_own_normals
 from ..models.material_model import material_model
-from ..models.prepared_material import GLOW_KEYS, Materials, PreparedMaterial
+from ..models.prepared_material import Materials, PreparedMaterial
 from .pass_counter import PassCounter
 
 if TYPE_CHECKING:  # the module needs Mitsuba's variant to be set
@@ -237,7 +237,7 @@ def load_mitsuba_renderer(
     prepare = material_model(model)
     check_plugins(document, scene_xml.name)
     prepare_for_fit(document)
-    material = prepare(document, target, parameters, materials)
+    material = prepare(document, target, parameters, _with_varying(materials, target, graph))
     # only Blender's model knows how to blur its lobes
     light_paths = light_paths if model == "blender_principled" else None
     scene, light_paths = _loaded(document, scene_xml, light_paths)
@@ -263,6 +263,8 @@ def load_renderers_together(
     found = [(find_target(document, shape_id), parameters) for shape_id, parameters in targets]
     check_plugins(document, scene_xml.name)
     prepare_for_fit(document)
+    for (target, _), graph in zip(found, graphs or [None] * len(found), strict=True):
+        materials = _with_varying(materials, target, graph)
     prepared = prepare_several_blender_principled(document, found, materials)
     scene, light_paths = _loaded(document, scene_xml, light_paths)
     return [
@@ -347,12 +349,18 @@ def _use_cycles_path(document: Element, plugin: str, properties: Mapping[str, fl
             ElementTree.SubElement(bsdf, "boolean", name="filtered", value="true")
 
 
+def _with_varying(materials: Materials, target: Target, graph: GraphPictures | None) -> Materials:
+    """Materials of which the target's says what values inside its nodes change."""
+    if graph is None or target.bsdf_id not in materials:
+        return materials
+    return {**materials, target.bsdf_id: {**materials[target.bsdf_id], "varying": tuple(graph.varying)}}
+
+
 def _keys_of(available: Sequence[str], material: PreparedMaterial) -> Mapping[str, str]:
     """The `mi.traverse` key of every parameter; wrappers such as `twosided` add a part in the middle."""
     keys = {}
     for name, end in material.key_ends.items():
-        owner = material.target.shape_id if end in GLOW_KEYS.values() else material.target.bsdf_id
-        found = [key for key in available if key.startswith(f"{owner}.") and key.endswith(f".{end}")]
+        found = [key for key in available if key.startswith(f"{material.target.bsdf_id}.") and key.endswith(f".{end}")]
         if len(found) != 1:
             raise BadInputError(f"Material {material.target.bsdf_id!r} has {len(found)} parameters {end!r}, not one.")
         keys[name] = found[0]

@@ -87,7 +87,7 @@ class TracedTarget:
         if directions:
             dr.enable_grad(*entries)
         parameters: dict[str, Any] = {}
-        if self.glow is not None:
+        if self.glow is not None and not self.glow.of_surface:
             parameters |= {"emission_color": mi.Color3f(1.0), "emission_strength": mi.Float(1.0)}
         iterator = iter(entries)
         for p in self.table:
