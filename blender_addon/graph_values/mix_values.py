@@ -10,20 +10,26 @@ from dataclasses import dataclass
 import bpy
 
 from ..export.nodes.closure_leaves import ClosureLeaf, Factor
-from ..export.nodes.leaf_kinds import CLEAR_SHADERS, TRANSPARENT, UNUSED_SOCKETS, inputs_of, is_fitted, kind_of, shines
+from ..export.nodes.leaf_kinds import (
+    CLEAR_SHADERS,
+    EMISSION,
+    TRANSPARENT,
+    UNUSED_SOCKETS,
+    inputs_of,
+    is_fitted,
+    kind_of,
+    shines,
+)
 from ..export.nodes.shader_graph import plain_value
 from ..export.nodes.target_shader import DIRECTIONS, TargetShader, leaf_name
 from ..versions import PRINCIPLED
 from .place import INPUT, Place
 from .ranges import BY_DEFAULT
-from .table import WEIGHT, GraphValue, graph_values, named_apart, one_word
+from .table import WEIGHT, GraphValue, graph_values, named_apart, one_word, without_glow
 
-# what a leaf has to have so that it scatters all light, and none is its own
-OPAQUE = {"Alpha": 1.0, "Transmission Weight": 0.0, "Emission Strength": 0.0}
-NOT_FITTED = (
-    *("Weight", "Alpha", "Transmission Weight", "Emission Color", "Emission Strength", "Subsurface Weight"),
-    *(*DIRECTIONS, *UNUSED_SOCKETS),
-)
+# what a leaf has to have so that it scatters all light
+OPAQUE = {"Alpha": 1.0, "Transmission Weight": 0.0}
+NOT_FITTED = (*("Weight", "Alpha", "Transmission Weight", "Subsurface Weight"), *DIRECTIONS, *UNUSED_SOCKETS)
 # of a Principled BSDF those that *All* takes: one picture tells little more of several, but for lobes that are there
 OF_PRINCIPLED = ("Base Color", "Metallic", "Roughness", "Specular IOR Level")
 WITH = {
@@ -122,12 +128,12 @@ def mix_values(target: TargetShader) -> list[MixValue]:
         place = Place((*(group.name for group in factor.groups), node.name), INPUT, factor.socket.identifier)
         found.append(_value(node, factor.socket.name, place, not _is_in_colors(target, factor), factor=factor))
     for number, leaf in enumerate(target.others):
-        if shines(leaf.node) or not is_fitted(leaf.node):
+        if not (is_fitted(leaf.node) or leaf.node.bl_idname == EMISSION):
             continue
         shader = TargetShader(leaf)
-        default = _default_names(shader)
+        default, held = _default_names(shader), {*NOT_FITTED, *without_glow(shader)}
         for name, at in shader.places.items():
-            if name in NOT_FITTED or at.socket.is_linked or not hasattr(at.socket, "default_value"):
+            if name in held or at.socket.is_linked or not hasattr(at.socket, "default_value"):
                 continue
             path = (*(group.name for group in at.groups), at.socket.node.name)
             place = Place(path, INPUT, at.socket.identifier, size=3 if at.socket.type in ("RGBA", "VECTOR") else 1)
@@ -167,7 +173,7 @@ def _factors(target: TargetShader) -> list[Factor]:
     held = {
         _place(factor)
         for leaf in leaves
-        if shines(leaf.node) or _is_hole(leaf.node) or (leaf.is_linked and len(leaf.ways) > 1)
+        if _is_hole(leaf.node) or (leaf.is_linked and len(leaf.ways) > 1)
         for way in leaf.ways
         for factor in way
     }
@@ -194,8 +200,10 @@ def _is_in_colors(target: TargetShader, factor: Factor) -> bool:
 
 
 def _has_free_color(leaf: ClosureLeaf) -> bool:
-    colors = [socket for name, socket in inputs_of(leaf.node).items() if name in ("Base Color", "Sheen Tint")]
-    return is_fitted(leaf.node) and any(not socket.is_linked for socket in colors)
+    if not (is_fitted(leaf.node) or leaf.node.bl_idname == EMISSION):
+        return False
+    names = ("Base Color", "Sheen Tint", "Emission Color")
+    return any(not socket.is_linked for name, socket in inputs_of(leaf.node).items() if name in names)
 
 
 def _not_plain(leaf: ClosureLeaf) -> str | None:
@@ -210,6 +218,8 @@ def _not_plain(leaf: ClosureLeaf) -> str | None:
 
 
 def _default_names(shader: TargetShader) -> list[str]:
+    if shader.node.bl_idname == EMISSION:  # of a product one factor
+        return ["Emission Color"] if not shader.sockets["Emission Color"].is_linked else ["Emission Strength"]
     if shader.node.bl_idname != PRINCIPLED:
         return [name for name in shader.places if not _is_absent(shader, name)]
     present = [extra for name, extras in WITH.items() if not _is_absent(shader, name) for extra in extras]

@@ -13,7 +13,7 @@ import bpy
 
 from ..export.nodes.closure_leaves import ClosureLeaf
 from ..export.nodes.graph_findings import GROUP, GROUP_INPUT, feeding
-from ..export.nodes.leaf_kinds import KINDS, UNUSED_SOCKETS
+from ..export.nodes.leaf_kinds import UNUSED_SOCKETS, is_numbered, kind_of
 from ..export.nodes.shader_graph import Links, plain_value, source_of
 from ..export.nodes.target_shader import DIRECTIONS, TargetShader
 from ..export.nodes.target_shader import Place as SocketPlace
@@ -34,9 +34,9 @@ from .ranges import (
 )
 from .tint import IMAGE, TINT_GAIN, TINT_OFFSET, is_tint, tint_of
 
-# what no fit of values inside nodes changes: what lets light through, and of a mix the light that it emits
+# what no fit of values inside nodes changes
 LETS_THROUGH = ("Alpha", "Transmission Weight")
-EMISSION = ("Emission Color", "Emission Strength")
+OF_GLOW = ("Emission Color", "Emission Strength")
 VALUE_NODE = "ShaderNodeValue"
 WEIGHT = "Weight"  # the share of a shader in a mix, among the names of its sockets
 MOST = 256  # values of one graph; what lies further upstream is not offered
@@ -119,26 +119,38 @@ def graph_values(target: TargetShader) -> list[GraphValue]:
 def _reached(target: TargetShader) -> Iterator[tuple[str, str, SocketPlace]]:
     """The linked sockets that a fit may change, each with its name and with what a tint of it is called.
 
-    Those of a mix's other shaders that reflect light have their number and a slash before; `WEIGHT` is a factor that
-    the weight of a shader hangs on.
+    Those of a mix's other shaders have their number and a slash before; `WEIGHT` is a factor that the weight of a
+    shader hangs on.
     """
     if not target.is_mixed:
-        glow = () if _is_dark(target) else EMISSION
-        yield from ((name, name, place) for name, place in target.places.items() if _is_free(name, place, glow))
+        yield from ((name, name, place) for name, place in _free_places(target))
         return
-    reflecting = [leaf for leaf in target.others if leaf.node.bl_idname in KINDS]
-    leaves = [(f"{number}/", leaf) for number, leaf in enumerate(reflecting)]
-    leaves.insert(sum(leaf.node.bl_idname in KINDS for leaf in target.others[: target.before]), ("", target.leaf))
+    numbered = [leaf for leaf in target.others if is_numbered(leaf.node)]
+    leaves = [(f"{number}/", leaf) for number, leaf in enumerate(numbered)]
+    leaves.insert(sum(is_numbered(leaf.node) for leaf in target.others[: target.before]), ("", target.leaf))
     for before, leaf in leaves:
-        shader, label = TargetShader(leaf), one_word(leaf.node.label or leaf.node.name)
-        for name, place in shader.places.items():
-            if _is_free(name, place) and name not in DIRECTIONS:
-                yield f"{before}{name}", f"{label} {shader.own_name(name)}", place
+        label = one_word(leaf.node.label or leaf.node.name)
+        if kind_of(leaf.node) is not None:  # a colour that shines has no sockets
+            shader = TargetShader(leaf)
+            for name, place in _free_places(shader):
+                if name not in DIRECTIONS:
+                    yield f"{before}{name}", f"{label} {shader.own_name(name)}", place
         yield from ((f"{before}{WEIGHT}", label, place) for place in _factors_of(leaf))
 
 
-def _is_free(name: str, place: SocketPlace, glow: Sequence[str] = ()) -> bool:
-    return place.socket.is_linked and name not in {*LETS_THROUGH, *UNUSED_SOCKETS, *EMISSION}.difference(glow)
+def _free_places(shader: TargetShader) -> Iterator[tuple[str, SocketPlace]]:
+    """The linked sockets of a shader that a fit may change; of one without light no emission."""
+    left_out = {*LETS_THROUGH, *UNUSED_SOCKETS, *without_glow(shader)}
+    for name, place in shader.places.items():
+        if place.socket.is_linked and name not in left_out:
+            yield name, place
+
+
+def without_glow(shader: TargetShader) -> Sequence[str]:
+    """The sockets of a shader that say nothing, for it has no light of its own."""
+    strength = shader.places.get("Emission Strength")
+    is_dark = strength is None or (not strength.socket.is_linked and plain_value(strength.socket) == 0.0)
+    return OF_GLOW if is_dark else ()
 
 
 def _factors_of(leaf: ClosureLeaf) -> list[SocketPlace]:
@@ -148,29 +160,22 @@ def _factors_of(leaf: ClosureLeaf) -> list[SocketPlace]:
 
 
 def _held(target: TargetShader) -> Iterator[SocketPlace]:
-    """What no value that is fitted may reach: displacement, glow, holes, a mix's normals, and its shaders of which the
-    fit holds a picture."""
+    """What no value that is fitted may reach: displacement, holes, a mix's normals, and its shaders of which the fit
+    holds a picture."""
     displacement = target.displacement
     if displacement is not None:
         yield SocketPlace(displacement, ())
     for leaf in (target.leaf, *target.others):
-        shader = TargetShader(leaf)
-        glow = () if _is_dark(shader) or not target.is_mixed else EMISSION
-        places = shader.places if leaf.node.bl_idname in KINDS else {}
-        yield from (places[name] for name in (*LETS_THROUGH, *glow) if name in places and places[name].socket.is_linked)
+        places = TargetShader(leaf).places if kind_of(leaf.node) is not None else {}
+        yield from (places[name] for name in LETS_THROUGH if name in places and places[name].socket.is_linked)
     for leaf in (target.leaf, *target.others) if target.is_mixed else ():
         directions = (leaf.node.inputs.get(name) for name in DIRECTIONS)
         yield from (SocketPlace(socket, leaf.groups) for socket in directions if socket is not None)
     for leaf in target.others:
-        if leaf.node.bl_idname not in KINDS:
+        if kind_of(leaf.node) is None:
             yield from (SocketPlace(socket, leaf.groups) for socket in leaf.node.inputs)
+        if not is_numbered(leaf.node):
             yield from _factors_of(leaf)
-
-
-def _is_dark(shader: TargetShader) -> bool:
-    """Whether a shader has no light of its own, whatever its colour is."""
-    strength = shader.places.get("Emission Strength")
-    return strength is None or (not strength.socket.is_linked and plain_value(strength.socket) == 0.0)
 
 
 def named(values: Sequence[Named], wanted: Sequence[str]) -> list[Named]:

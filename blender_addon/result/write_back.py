@@ -11,6 +11,7 @@ from typing import Any
 import bpy
 
 from ..export.materials.principled_mapping import mitsuba_to_sockets
+from ..export.nodes.leaf_kinds import is_fitted
 from ..export.nodes.target_shader import (
     ALL_LEAVES,
     TargetShader,
@@ -206,12 +207,12 @@ def _key(target: TargetShader, name: str) -> str:
 
 
 def _key_inside(target: TargetShader, value: GraphValue | MixValue) -> str:
-    """The same of a value beside the sockets: of a mix it has one whichever leaf is fitted."""
+    """The same of a value beside the sockets: of a mix it has one whichever leaf is fitted, which a glow never is."""
     if not target.is_mixed:
         return value.name
-    if not isinstance(value, MixValue) or value.factor is not None:
-        return f"{ALL_LEAVES}{OF_LEAF}{value.name}"
-    return f"{leaf_name(target.others[value.leaf])}{OF_LEAF}{value.socket}"
+    if isinstance(value, MixValue) and value.factor is None and is_fitted(target.others[value.leaf].node):
+        return f"{leaf_name(target.others[value.leaf])}{OF_LEAF}{value.socket}"
+    return f"{ALL_LEAVES}{OF_LEAF}{value.name}"
 
 
 def _leaf_of(key: str) -> str | None:

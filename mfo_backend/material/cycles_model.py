@@ -24,6 +24,10 @@ SHADERS = (
 )
 
 
+# of a mix also what gives light alone
+LEAF_SHADERS = (*SHADERS, "emission")
+
+
 @dataclass(frozen=True)
 class CyclesModel:
     """Switches of the evaluation. The albedo tables are the same in all versions from 4.2 to 5.2.
@@ -47,7 +51,7 @@ class CyclesModel:
         What nodes bend of a diffuse lobe's normal shades light as bumps of a microfacet surface would (from 4.5);
         before, the light fades towards the plane of the mesh.
     shader
-        The node, one of `SHADERS`. "glossy" is a metal of base colour at every angle, "conductor" one by index and
+        The node, one of `LEAF_SHADERS`. "glossy" is a metal of base colour at every angle, "conductor" one by index and
         extinction. "glass" tints what it reflects and what it lets through by the base colour, "refraction" reflects
         nothing, and "translucent" is a white cosine lobe on the other side times the base colour. The sheen of "toon"
         is a cone about the normal, that of "toon_glossy" one about the mirrored view. Light enters below "subsurface"
@@ -99,8 +103,8 @@ def cycles_model(
         raise BadInputError(f"Blender {'.'.join(map(str, version))} has another Principled BSDF: use 4.2 or newer.")
     if distribution not in DISTRIBUTIONS:
         raise BadInputError(f"Unknown distribution {distribution!r}: choose one of {', '.join(DISTRIBUTIONS)}.")
-    if shader not in SHADERS:
-        raise BadInputError(f"Unknown shader {shader!r}: choose one of {', '.join(SHADERS)}.")
+    if shader not in LEAF_SHADERS:
+        raise BadInputError(f"Unknown shader {shader!r}: choose one of {', '.join(LEAF_SHADERS)}.")
     return CyclesModel(
         multiple_scattering=distribution == "MULTI_GGX",
         microfacets=distribution if distribution in ("BECKMANN", "ASHIKHMIN_SHIRLEY") else "GGX",

@@ -139,12 +139,13 @@ class MixedModel(BlenderPrincipledModel):
 
     The values of the fitted leaf have the names of a plain material, free ones of others what a user calls them, and
     what else leaf k has is "leaf_k.base_color" and so on. A leaf's "weight" is what it has without the factors. Light
-    may walk below one of them, as in `InnerLightModel`. Directions are in the frame of the fitted leaf's microfacets.
+    may walk below one of them, and with `glows` they emit, as in `InnerLightModel`. Directions are in the frame of the
+    fitted leaf's microfacets.
     """
 
-    def __init__(self, tree: Any, mix: MixValues) -> None:
+    def __init__(self, tree: Any, mix: MixValues, *, glows: bool = False) -> None:
         super().__init__(tree.model, normals=normals_of(tree))
-        self._tree, self._mix = tree, mix
+        self._tree, self._mix, self._glows = tree, mix, glows
         self._names = {
             k: {p.name: mix.leaves.get(k, {}).get(p.name, f"leaf_{k}.{p.name}") for p in BLENDER_PRINCIPLED}
             for k in tree.free_leaves
@@ -159,7 +160,7 @@ class MixedModel(BlenderPrincipledModel):
         self.table = ParameterTable(
             [*BLENDER_PRINCIPLED, *mix.parameters, *held, *(Parameter(name, 1, 0.0, 1.0, 1.0) for name in weights)]
         )
-        rough = [names["roughness"] for names in self._names.values()]
+        rough = [names["roughness"] for k, names in self._names.items() if not tree.held[k].only_glows]
         self.widths = ("roughness", *rough)
         # a fit of factors alone has no width to scan
         self.scanned = (*BlenderPrincipledModel.scanned, *rough)
@@ -199,7 +200,7 @@ class MixedModel(BlenderPrincipledModel):
         def seen(parameters: Mapping[str, Any], wi: Any, wo: Any) -> Any:
             factors = [parameters[name] for name in self._mix.factors]
             smooth = parameters.get("smooth_normal", dr.kind_of(wi)(0, 0, 1))
-            lit, inside = [], None
+            lit, glow, below = [], [], None
             for leaf, names, turned, weight, lobes in leaves:
                 of_leaf, own_wi, own_wo = {name: parameters[shown] for name, shown in names.items()}, wi, wo
                 if turned is not None:
@@ -209,11 +210,19 @@ class MixedModel(BlenderPrincipledModel):
                 layers = layer_stack(of_leaf or parameters, own_wi, lobes, leaf.material.model)
                 amount = parameters[weight] * amount_of(leaf.ways, factors)
                 if self.walks and leaf is self._tree.walking and layers.below is not None:
-                    inside = layers.below.shown(wi, parameters) * amount
+                    below = layers.below.shown(wi, parameters) * amount
                     layers = replace(layers, subsurface=None)
-                lit.append(evaluate(layers, layers.to_frame(own_wo)) * amount)
+                if self._glows:
+                    glow.append(layers.emission * amount)
+                if not leaf.only_glows:
+                    lit.append(evaluate(layers, layers.to_frame(own_wo)) * amount)
             value = sum(lit[1:], lit[0])
-            return value if inside is None else dr.select(dr.dot(wo, wo) > 0, value, inside)
+            if below is None and not glow:
+                return value
+            inside = sum(glow[1:], glow[0]) if glow else 0 * value
+            if below is not None:
+                inside = dr.select(parameters["walk_length"] > 0, below, inside)
+            return dr.select(dr.dot(wo, wo) > 0, value, inside)
 
         return seen
 
@@ -245,7 +254,7 @@ def recorded_model(
     if name == "mitsuba_principled":
         return MitsubaPrincipled()
     if mix is not None:
-        return MixedModel(bsdf, mix)
+        return MixedModel(bsdf, mix, glows=glows)
     if name == "blender_principled":
         cycles, normals = getattr(bsdf, "model", BLENDER_5_0), normals_of(bsdf)
         if glows or walks:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""A leaf with the sun behind it, and a sign that glows: what is found of their .blend files is in their nodes."""
+"""A leaf with the sun behind it, and what glows: a sign, lava, a lit decal. What is found is in their .blend files."""
 
 from __future__ import annotations
 
@@ -72,6 +72,48 @@ done(
     [(0.5, 0.5, 0.5, 1.0), float(argv[2])],
 )
 """
+LAVA = f"""{SCENE}
+noise, ramp = (nodes.new(f"ShaderNode{{kind}}") for kind in ("TexNoise", "ValToRGB"))
+noise.inputs["Scale"].default_value = 3.0
+low, high = ramp.color_ramp.elements
+low.position, high.position, low.color, high.color = 0.4, 0.6, (0.02, 0.02, 0.02, 1.0), (0.9, 0.35, 0.05, 1.0)
+links.new(noise.outputs[0], ramp.inputs[0])
+links.new(ramp.outputs[0], plastic.inputs["Emission Color"])
+plastic.inputs["Emission Strength"].default_value = 2.0
+grey = (0.4, 0.4, 0.4, 1.0)
+done(
+    [(low, "color"), (high, "color"), (plastic.inputs["Base Color"], "default_value")], [grey, grey, grey]
+)
+"""
+DECAL = f"""{SCENE}
+glow, mix, noise, ramp = (
+    nodes.new(f"ShaderNode{{kind}}") for kind in ("Emission", "MixShader", "TexNoise", "ValToRGB")
+)
+noise.inputs["Scale"].default_value = 3.0
+low, high = ramp.color_ramp.elements
+low.position, high.position = 0.45, 0.55
+glow.inputs["Strength"].default_value, glow.inputs["Color"].default_value = 2.0, (0.9, 0.3, 0.1, 1.0)
+plastic.inputs["Base Color"].default_value = (0.1, 0.2, 0.4, 1.0)
+for first, second in (
+    (noise.outputs[0], ramp.inputs[0]), (ramp.outputs[0], mix.inputs[0]), (plastic.outputs[0], mix.inputs[1]),
+    (glow.outputs[0], mix.inputs[2]), (mix.outputs[0], out.inputs["Surface"]),
+):
+    links.new(first, second)
+done(
+    [(glow.inputs["Color"], "default_value"), (plastic.inputs["Base Color"], "default_value")],
+    [(0.5, 0.5, 0.5, 1.0), (0.5, 0.5, 0.5, 1.0)],
+)
+"""
+SHOW_GLOW = """
+bpy.ops.wm.open_mainfile(filepath=argv[0])
+nodes = bpy.data.objects["Sheet"].active_material.node_tree.nodes
+if "Emission" in nodes:
+    colors, strength = [nodes["Emission"].inputs["Color"].default_value], nodes["Emission"].inputs["Strength"]
+else:
+    colors = [element.color for element in nodes["Color Ramp"].color_ramp.elements]
+    strength = nodes["Principled BSDF"].inputs["Emission Strength"]
+found = [[strength.default_value * number for number in list(color)[:3]] for color in colors]
+"""
 SHOW = """
 bpy.ops.wm.open_mainfile(filepath=argv[0])
 nodes = bpy.data.objects["Sheet"].active_material.node_tree.nodes
@@ -109,3 +151,24 @@ def test_the_strength_of_a_glow_by_a_picture_is_found(tmp_path: Path, strength: 
     assert done.code == 0, done.stderr
     assert done.answer["verdict"] == "same"
     assert run_bpy(SHOW, saved) == pytest.approx(2.5, rel=0.02)
+
+
+@pytest.mark.parametrize(
+    ("build", "radiances"),
+    [(LAVA, [(0.04, 0.04, 0.04), (1.8, 0.7, 0.1)]), (DECAL, [(1.8, 0.6, 0.2)])],
+    ids=["a ramp", "a shader of a mix"],
+)
+def test_the_light_that_nodes_give_is_found(
+    tmp_path: Path, build: str, radiances: list[tuple[float, float, float]]
+) -> None:
+    """Colour and strength are a product."""
+    start, picture, saved = tmp_path / "start.blend", tmp_path / "glow.exr", tmp_path / "saved.blend"
+    run_bpy(build, start, picture)
+    done = run_mfo(
+        "blend", start, "--object", "Sheet", "--reference", picture,
+        "--out", tmp_path / "job", "--apply", "--save-as", saved, "--json",
+    )  # fmt: skip
+    assert done.code == 0, done.stderr
+    assert done.answer["verdict"] == "same"
+    for found, radiance in zip(run_bpy(SHOW_GLOW, saved), radiances, strict=True):
+        assert found == pytest.approx(radiance, abs=0.03)

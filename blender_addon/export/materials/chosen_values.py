@@ -24,7 +24,7 @@ from ..fitted_slot import FittedSlot
 from ..material_model import Material
 from ..nodes.displacement import SHADING_NORMAL
 from ..nodes.graph_findings import graph_problem
-from ..nodes.leaf_kinds import CLEAR_SHADERS, KINDS, OPAQUE
+from ..nodes.leaf_kinds import CLEAR_SHADERS, KINDS, OPAQUE, is_numbered
 from ..nodes.shader_graph import plain_value
 from ..nodes.target_shader import DIRECTIONS, TargetShader, fits_all_leaves, target_shader
 
@@ -139,7 +139,7 @@ def _by_graph(material: Material, target: TargetShader, names: Sequence[str], fi
 
 def _numbers_of_leaves(target: TargetShader) -> list[int]:
     """Where in a mix's other shaders those are that the names of what values reach have numbers of."""
-    return [position for position, leaf in enumerate(target.others) if leaf.node.bl_idname in KINDS]
+    return [position for position, leaf in enumerate(target.others) if is_numbered(leaf.node)]
 
 
 def request_of(

@@ -84,7 +84,7 @@ def emission_element(material: Material, scale: float, save: Callable[[Texture],
     if material.emission.max(initial=0.0) <= 0.0:
         return None
     emitter = plugin("emitter", "blender_glow")
-    if material.is_mixed or color is None or strength is None:  # of a mix the mean; the backend has the whole of it
+    if material.is_mixed or color is None or strength is None:  # of a mix the mean; the backend knows all
         return add(emitter, rgb("radiance", material.emission * scale))
     if not material.emission_is_dimmed:
         add(emitter, boolean("layered", True))
@@ -110,9 +110,6 @@ def approximated(material: Material) -> list[str]:
         found.append("a Subsurface Anisotropy below zero is fitted as zero: choose Random Walk for Subsurface.")
     if material.value("Thin Wall", False):
         found.append("Thin Wall is left out.")
-    above = {name for leaf in (material, *material.leaves) if material.is_mixed for name in _above_emission(leaf)}
-    if above:
-        found.append(f"the emission is not dimmed by {', '.join(sorted(above))}, as it is in Cycles.")
     return found
 
 

@@ -100,6 +100,7 @@ CONDUCTOR = LeafKind(
 GLOSSY_TOON = LeafKind({"Sheen Tint": "Color"}, _SHEEN, "toon_glossy")
 UNUSED_SOCKETS = ("Thin Wall",)  # of a Principled BSDF those that no model has, whatever is linked to them
 EMISSION, TRANSPARENT = "ShaderNodeEmission", "ShaderNodeBsdfTransparent"
+GLOW = LeafKind({"Emission Color": "Color", "Emission Strength": "Strength"}, shader="emission")  # beside others alone
 # values of `all` that join only where the node has some of them already
 _WHERE_PRESENT = {
     "Anisotropic": "Anisotropic",
@@ -118,6 +119,8 @@ def is_shader(node: bpy.types.Node) -> bool:
 
 def kind_of(node: bpy.types.Node) -> LeafKind | None:
     """How a node is fitted, or held; None of one without a model."""
+    if node.bl_idname == EMISSION:
+        return GLOW
     if node.bl_idname == METALLIC and node.fresnel_type == "PHYSICAL_CONDUCTOR":
         return CONDUCTOR
     if node.bl_idname == TOON and node.component == "GLOSSY":
@@ -131,8 +134,13 @@ def shines(node: bpy.types.Node) -> bool:
 
 
 def is_fitted(node: bpy.types.Node) -> bool:
-    """Whether the values of a node can be fitted: its model is exact."""
-    return kind_of(node) is not None and why_not_fitted(node) is None
+    """Whether the values of a node can be fitted by themselves: it reflects light, and its model is exact."""
+    return node.bl_idname != EMISSION and kind_of(node) is not None and why_not_fitted(node) is None
+
+
+def is_numbered(node: bpy.types.Node) -> bool:
+    """Whether a leaf beside the fitted one has a number in a job: what passes straight through has none."""
+    return node.bl_idname != TRANSPARENT
 
 
 def why_not_fitted(node: bpy.types.Node) -> str | None:

@@ -166,8 +166,14 @@ def chosen_leaf(material: bpy.types.Material | None) -> str:
 
 
 def fits_all_leaves(material: bpy.types.Material | None) -> bool:
-    """Whether the user chose to have all shaders of a mix fitted; the largest has the plain names then."""
-    return _kept_leaf(material) == ALL_LEAVES
+    """Whether all shaders of a mix are fitted: the user chose so, or what is beside the one that reflects glows.
+
+    The largest has the plain names then.
+    """
+    if _kept_leaf(material) == ALL_LEAVES:
+        return True
+    nodes = [leaf.node for leaf in _leaves(material)]
+    return len([node for node in nodes if is_fitted(node)]) == 1 and any(node.bl_idname == EMISSION for node in nodes)
 
 
 def _kept_leaf(material: bpy.types.Material | None) -> str:
@@ -203,8 +209,13 @@ def leaf_called(material: bpy.types.Material, wanted: str) -> str:
 
 def fitted_leaves(material: bpy.types.Material | None) -> list[ClosureLeaf]:
     """The leaves of which a user may choose one."""
+    return [leaf for leaf in _leaves(material) if is_fitted(leaf.node)]
+
+
+def _leaves(material: bpy.types.Material | None) -> list[ClosureLeaf]:
+    """All leaves, none of what cannot be taken apart."""
     try:
-        return [leaf for leaf in closure_leaves(material) if is_fitted(leaf.node)]
+        return closure_leaves(material)
     except ClosureError:
         return []
 

@@ -7,13 +7,14 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
-from ...material.cycles_model import SHADERS
+from ...material.cycles_model import LEAF_SHADERS, SHADERS
 from ...material.principled.principled_parameters import WEIGHT
 from .checked_object import CheckedObject, is_number
 from .mix_request import MIX_KEYS, MixFactor, MixWay, check_mix, factors_from_json, free_from_json, ways_from_json
 
 MOST_LEAVES = 64  # of a mix
-OTHER_LEAVES = ("transparent", "emission")
+TRANSPARENT = "transparent"  # of a mix what passes straight through
+_OF_LEAVES = (*LEAF_SHADERS, TRANSPARENT)
 _NORMAL_KEYS = ("displaced", "turned")  # of what a `normalmap` over it has
 _MATERIAL_KEYS = (
     *("name", "distribution", "subsurface_method", "sockets", "shader", "weight", "leaves"),
@@ -68,8 +69,8 @@ class Material:
     @property
     def graph_names(self) -> list[str]:
         """Names of what nodes give, as values inside them name what they reach: sockets, `WEIGHT`, and of the leaves
-        that reflect light both after a leaf's number and a slash."""
-        of_leaves = enumerate(leaf for leaf in self.leaves if leaf.shader not in OTHER_LEAVES)
+        but Transparent both after a leaf's number and a slash."""
+        of_leaves = enumerate(leaf for leaf in self.leaves if leaf.shader != TRANSPARENT)
         return [*self._graph_names, *(f"{k}/{name}" for k, leaf in of_leaves for name in leaf._graph_names)]
 
     @property
@@ -121,7 +122,7 @@ def _shader(data: Any, where: str, shaders: Sequence[str]) -> Material:
         varies=material.boolean("varies", False),
         displaced=material.boolean("displaced", False),
         turned=material.boolean("turned", False),
-        leaves=tuple(_shader(leaf, f"{where}.leaves[{k}]", (*SHADERS, *OTHER_LEAVES)) for k, leaf in enumerate(leaves)),
+        leaves=tuple(_shader(leaf, f"{where}.leaves[{k}]", _OF_LEAVES) for k, leaf in enumerate(leaves)),
     )
 
 

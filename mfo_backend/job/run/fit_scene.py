@@ -48,7 +48,7 @@ _OF_EVERY_FIT = (
     *("...fit.pictures.one_sheet", "...render.pictures.pixel_pictures", "...render.transport.direct_light"),
     *("...render.paths.recorded_scene", "...render.traced.traced_paths"),
     *("...render.lamps.lamp_plugins", "...render.lamps.changed_light"),
-    *("...material.plugins.projective_texture", "...material.plugins.leaf_radiance"),
+    "...material.plugins.projective_texture",
     *("...material.plugins.mapped_normal", "...material.plugins.by_ray", "...render.camera.seen_through"),
     *("scipy.ndimage", "scipy.optimize", "PIL.Image", "PIL.ImageDraw", "PIL.ImageFont", "OpenEXR"),
 )

@@ -107,17 +107,20 @@ def absent_notes(request: Request, result: FitResult) -> tuple[str, ...]:
 def held_notes(request: Request, result: FitResult) -> tuple[str, ...]:
     """What was held and may light other things, where the result is not the same: they seem to be lit by other lamps.
 
-    That is a glow that nodes give, which no fit changes, and other shaders of a mix.
+    That is a glow that nodes give, and other shaders of a mix.
     """
     material, judgement = request.materials.get(request.target.bsdf_id), result.judgement
     if material is None or judgement is None or judgement.verdict is Verdict.SAME:
         return ()
-    leaves = ", ".join(leaf.name for leaf in material.leaves if not leaf.free)
+    leaves = ", ".join(leaf.name for leaf in material.leaves if not (leaf.free or leaf.varies))
     notes = [_LEAVES_HELD.format(names=leaves)] if leaves else []
     color, strength = (
         material.sockets.get(SOCKET_OF_PARAMETER[name]) for name in ("emission_color", "emission_strength")
     )
-    if color is not None and strength is not None and "emission_strength" not in result.recovered:
+    values = () if request.graph is None else request.graph.values
+    fitted = {name for value in values if value.name in result.recovered for name in value.sockets}
+    is_fitted = "emission_strength" in result.recovered or fitted & {"Emission Color", "Emission Strength"}
+    if color is not None and strength is not None and not is_fitted:
         glows = strength.linked or (color.linked and strength.value != 0.0)
         notes += [_GLOW_HELD] if glows else []
     return tuple(notes)

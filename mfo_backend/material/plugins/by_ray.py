@@ -94,11 +94,11 @@ class ByRay(mi.BSDF):
         """That of what scattered rays meet."""
         return self._looks[SCATTERED].eval_diffuse_reflectance(si, active)
 
-    def emission_share(self, si: mi.SurfaceInteraction3f, active: Any = True, *, sampled: bool = False) -> mi.Color3f:
-        """What layers leave of the surface's own light, as of scattered rays: all see the same."""
+    def emitted(self, si: mi.SurfaceInteraction3f, active: Any, **of_light: Any) -> mi.Color3f:
+        """The surface's own light, as of scattered rays: all see the same."""
         look = self._looks[SCATTERED]
-        if hasattr(look, "emission_share"):
-            return look.emission_share(si, active, sampled=sampled)
+        if hasattr(look, "emitted"):
+            return look.emitted(si, active, **of_light)
         return 1 - mi.Color3f(look.eval_null_transmission(si, active))
 
     def to_string(self) -> str:

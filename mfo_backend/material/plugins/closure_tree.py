@@ -2,10 +2,10 @@
 """The Mitsuba plugin `closure_tree`: a fitted material among held ones, each with a weight that may vary.
 
 Choose the variant before importing this. Properties are `fitted`, a nested `blender_principled`, and its `weight`;
-further `leaf_0`, `weight_0`, `leaf_1`, ... of the same plugin, which are held, and `clear_0`, `clear_weight_0`, ... ,
-colours of what passes straight through. Weights and colours are numbers, colours or textures. The surface is the sum of
-all, as Mix and Add Shader of Blender have it. Light walks below the surface of one leaf; where several let it, a
-Lambert lobe stands for that in each of them.
+further `leaf_0`, `weight_0`, `leaf_1`, ... of the same plugin, which are held and may only glow, and `clear_0`,
+`clear_weight_0`, ... , colours of what passes straight through. Weights and colours are numbers, colours or textures.
+The surface is the sum of all, as Mix and Add Shader of Blender have it. Light walks below the surface of one leaf;
+where several let it, a Lambert lobe stands for that in each of them.
 
 `factor_0`, `factor_1`, ... are factors of Mix Shaders that may change; a leaf that hangs on them has `ways` (that of
 number k `ways_k`) which its weight is multiplied with: the sum over words such as "1.5 -0 +1", a share times 1 - factor
@@ -18,7 +18,7 @@ number k `ways_k`) which its weight is multiplied with: the sum over words such 
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 from functools import reduce
 from operator import or_
@@ -30,40 +30,13 @@ import numpy as np
 
 from ..arrays.clamp import mean
 from ..principled.bumped_normals import LEAF_NORMALS
-from ..principled.mix_values import Way, amount_of, ways_in
+from ..principled.mix_values import ways_in
 from ..principled.random_walk import Below
+from .closure_leaf import Leaf, at, colour_or_texture, number_or_texture
 from .principled_plugin import BlenderPrincipled
 
 PLUGIN_NAME = "closure_tree"
 LEAST = 1e-3  # of the weights that choose a leaf: none has no chance where all are black
-
-
-@dataclass(frozen=True)
-class Leaf:
-    """A material and its weight, a number or a texture, times what the `factors` of the tree make of its `ways`.
-
-    Textures of one that `varies` change.
-    """
-
-    material: BlenderPrincipled
-    weight: Any
-    ways: tuple[Way, ...]
-    factors: Sequence[Any]
-    varies: bool
-
-    def weight_at(self, si: Any, active: Any = True) -> Any:
-        """The weight at a surface point."""
-        weight = _at(self.weight, si, active)
-        return weight * amount_of(self.ways, self.factors) if self.ways else weight
-
-    def plain_weight_at(self, si: Any, active: Any = True) -> Any:
-        """The same without the factors."""
-        return _at(self.weight, si, active)
-
-    @property
-    def is_free(self) -> bool:
-        """Whether something of it may change."""
-        return bool(self.ways or self.material.free or self.varies)
 
 
 @dataclass(frozen=True)
@@ -95,12 +68,13 @@ class ClosureTree(mi.BSDF):
         self.fitted = self._leaf(props, "fitted", "")
         self.held = tuple(self._leaf(props, f"leaf_{k}", f"_{k}") for k in _counted(props, "leaf_"))
         self.clear = tuple(
-            (_colour(props[f"clear_{k}"]), _number(props.get(f"clear_weight_{k}", 1.0)))
+            (colour_or_texture(props[f"clear_{k}"]), number_or_texture(props.get(f"clear_weight_{k}", 1.0)))
             for k in _counted(props, "clear_")
         )
-        for leaf in self.leaves:
+        for leaf in (self.fitted, *self.held):
             if not isinstance(leaf.material, BlenderPrincipled):
                 raise RuntimeError("a leaf of closure_tree is no blender_principled")
+        self.scattering = tuple(leaf for leaf in self.held if not leaf.only_glows)
         walking = [leaf for leaf in self.leaves if leaf.material.has_below]
         self.walking = walking[0] if len(walking) == 1 else None
         for leaf in self.leaves:
@@ -114,7 +88,7 @@ class ClosureTree(mi.BSDF):
 
     def _leaf(self, props: mi.Properties, leaf: str, end: str) -> Leaf:
         """The leaf whose own properties end so."""
-        weight, ways = _number(props.get(f"weight{end}", 1.0)), ways_in(str(props.get(f"ways{end}", "")))
+        weight, ways = number_or_texture(props.get(f"weight{end}", 1.0)), ways_in(str(props.get(f"ways{end}", "")))
         return Leaf(props[leaf], weight, ways, self.factors, bool(props.get(f"varies{end}", False)))
 
     @property
@@ -129,8 +103,8 @@ class ClosureTree(mi.BSDF):
 
     @property
     def leaves(self) -> tuple[Leaf, ...]:
-        """The fitted material and the held ones."""
-        return (self.fitted, *self.held)
+        """The fitted material and those held ones that scatter light."""
+        return (self.fitted, *self.scattering)
 
     @property
     def is_held_in_lanes(self) -> bool:
@@ -242,10 +216,20 @@ class ClosureTree(mi.BSDF):
     def held_value(self, si: mi.SurfaceInteraction3f, wo: mi.Vector3f, active: Any = True) -> Any:
         """f_r |cos| of the materials that nothing changes with their weights, RGB."""
         context, value = mi.BSDFContext(), mi.Color3f(0)
-        for leaf in self.held:
+        for leaf in self.scattering:
             if not leaf.is_free:
                 value += leaf.weight_at(si, active) * leaf.material.eval(context, si, wo, active)
         return value
+
+    def held_emission(self, si: mi.SurfaceInteraction3f, active: Any = True) -> mi.Color3f:
+        """The light towards `si.wi` of the materials that nothing changes."""
+        held = (leaf.emitted(si, active, sampled=False) for leaf in self.held if leaf.glows and not leaf.is_free)
+        return sum(held, mi.Color3f(0))
+
+    def emitted(self, si: mi.SurfaceInteraction3f, active: Any, *, sampled: bool) -> mi.Color3f:
+        """The surface's own light towards `si.wi`, perhaps to a light sample."""
+        every = (leaf.emitted(si, active, sampled=sampled) for leaf in (self.fitted, *self.held) if leaf.glows)
+        return sum(every, mi.Color3f(0))
 
     def eval(self, ctx: mi.BSDFContext, si: mi.SurfaceInteraction3f, wo: mi.Vector3f, active: Any = True) -> Any:
         """f_r |cos|, RGB."""
@@ -279,7 +263,7 @@ class ClosureTree(mi.BSDF):
         own = (u1 >= through) & (u1 < through + chance)
         drawn, start = dr.zeros(mi.BSDFSample3f), through + chance
         passes, passing_chance = self._clear(si, active), through
-        for each, leaf in zip(held, self.held, strict=True):
+        for each, leaf in zip(held, self.scattering, strict=True):
             chosen = active & (u1 >= start)  # the last of them stays
             start += each
             sampled, _ = leaf.material.sample(ctx, si, _within(u1, start - each, each), u2, chosen)
@@ -297,7 +281,7 @@ class ClosureTree(mi.BSDF):
             drawn=drawn,
             passes=passes,
             passing_chance=passing_chance,
-            held=lambda wo: self._eval_pdf(self.held, held, ctx, si, wo, active),
+            held=lambda wo: self._eval_pdf(self.scattering, held, ctx, si, wo, active),
         )
 
     def sample(
@@ -360,7 +344,7 @@ class ClosureTree(mi.BSDF):
     def _clear(self, si: mi.SurfaceInteraction3f, active: Any) -> Any:
         value = mi.Color3f(0)
         for colour, weight in self.clear:
-            value += _at(weight, si, active) * mi.Color3f(
+            value += at(weight, si, active) * mi.Color3f(
                 colour.eval(si, active) if isinstance(colour, mi.Texture) else colour
             )
         return value
@@ -376,22 +360,6 @@ def _counted(props: mi.Properties, prefix: str) -> Iterator[int]:
     while f"{prefix}{count}" in props:
         yield count
         count += 1
-
-
-def _number(value: Any) -> Any:
-    return value if isinstance(value, mi.Texture) else dr.opaque(mi.Float, float(value))
-
-
-def _colour(value: Any) -> Any:
-    if isinstance(value, mi.Texture):
-        return value
-    colour = mi.Color3f(value)
-    dr.make_opaque(colour)
-    return colour
-
-
-def _at(value: Any, si: Any, active: Any) -> Any:
-    return value.eval_1(si, active) if isinstance(value, mi.Texture) else value
 
 
 def register() -> None:

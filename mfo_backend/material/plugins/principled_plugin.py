@@ -16,9 +16,8 @@ of rough glass leads to do not count there. `mi.traverse` shows
 `<id>.base_color`, `<id>.roughness`, ...; textures as `<id>.<name>.data`. `normal`, `coat_normal` and `tangent` may be
 textures of world directions on the camera's side, zero for the mesh's own.
 
-A Mitsuba BSDF cannot emit. An emitting material needs a `blender_glow` emitter, which asks what is `emitted`, or of a
-radiance of its own the `emission_share` that alpha, sheen and coat leave. The tangent is that of Mitsuba's shading
-frame, dp/du of the UV map.
+A Mitsuba BSDF cannot emit. An emitting material needs a `blender_glow` emitter, which asks what is `emitted`. The
+tangent is that of Mitsuba's shading frame, dp/du of the UV map.
 """
 
 from __future__ import annotations
@@ -124,10 +123,6 @@ class BlenderPrincipled(mi.BSDF):
             self._choose_lobes()
         dr.make_opaque([getattr(self, name) for name in changed])
         self._row = None
-
-    def emission_share(self, si: mi.SurfaceInteraction3f, active: Any, *, sampled: bool) -> mi.Color3f:
-        """What alpha, sheen and coat leave of the surface's own light towards `si.wi`, perhaps to a light sample."""
-        return self.emitted(si, active, sampled=sampled, emission_color=mi.Color3f(1), emission_strength=mi.Float(1))
 
     def emitted(self, si: mi.SurfaceInteraction3f, active: Any, *, sampled: bool, **instead: Any) -> mi.Color3f:
         """The surface's own light towards `si.wi`, perhaps to a light sample, with the values `instead` of its own."""

@@ -65,7 +65,7 @@ def select_blender_parameters(
     present
         Names that the material sets to something other than what shows nothing (`PLAIN`).
     linked
-        Names that a texture feeds; they stay fixed. Of an emission whose colour is one of them the strength is free.
+        Names that a texture feeds; they stay fixed. Of an emission with one of colour and strength the other is free.
 
     Raises
     ------
@@ -80,6 +80,7 @@ def select_blender_parameters(
         if selection == "all":
             wanted += [extra for name, extras in _WITH.items() if name in present for extra in extras]
             wanted += [name for name, other in TIMES.items() if name in present and other in linked]
+            wanted += [other for name, other in TIMES.items() if name in linked]
         return BLENDER_PRINCIPLED.select(name for name in wanted if name not in linked)
     table = BLENDER_PRINCIPLED.select(selection)
     for name in table.names:

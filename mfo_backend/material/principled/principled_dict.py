@@ -13,8 +13,6 @@ from .principled_parameters import BLENDER_PRINCIPLED, PARAMETER_OF_SOCKET
 MESH_TANGENT = "vertex_tangent"  # the attribute of a mesh that holds the directions of a `Tangent` with `mesh`
 # Sockets without effect here: normals and tangents are the mesh's
 _IGNORED = {"Weight", "Thin Wall"}
-_EMISSION = {"Emission Color": [1.0, 1.0, 1.0], "Emission Strength": 0.0}
-# but for those that nodes give as the camera sees them. The first is no socket: it is what a displacement by bump makes
 # of the mesh's normals
 DIRECTIONS = {
     "Shading Normal": "shading_normal",
@@ -110,8 +108,8 @@ def closure_tree_dict(
 
 
 def held_leaves(material: Mapping[str, Any]) -> list[Mapping[str, Any]]:
-    """The leaves of a material of request.json that reflect light, beside the fitted one."""
-    return [leaf for leaf in material.get("leaves", ()) if leaf["shader"] not in ("transparent", "emission")]
+    """The leaves of a material of request.json beside the fitted one, but for what passes straight through."""
+    return [leaf for leaf in material.get("leaves", ()) if leaf["shader"] != "transparent"]
 
 
 def _ways(name: str, leaf: Mapping[str, Any]) -> dict[str, str]:
@@ -134,21 +132,11 @@ def is_mixed(material: Mapping[str, Any]) -> bool:
     return bool(material.get("leaves") or weight.get("graph") or weight.get("texture") or weight.get("value") != 1.0)
 
 
-def leaf_radiance_dict(material: Mapping[str, Any], scale: float) -> dict[str, Any] | None:
-    """Properties of the texture `leaf_radiance` of a material of request.json.
-
-    None where nothing but the plain values of a single leaf emits: an emitter of one colour is enough then.
-    """
+def emits_by_place(material: Mapping[str, Any]) -> bool:
+    """Whether a material of request.json emits what no one colour or texture says: of a mix, or what nodes give."""
     emitting = [leaf for leaf in (material, *material.get("leaves", ())) if _emits(leaf["sockets"])]
-    asked = [leaf["sockets"].get(name, {}) for leaf in emitting for name in _EMISSION]
-    if not emitting or not (is_mixed(material) or any(socket.get("graph") for socket in asked)):
-        return None
-    result: dict[str, Any] = {"type": "leaf_radiance", "scale": scale}
-    for k, leaf in enumerate(emitting):
-        color, strength = (leaf["sockets"].get(name, {"value": default}) for name, default in _EMISSION.items())
-        result |= {f"color_{k}": _amount(color), f"strength_{k}": _amount(strength)}
-        result[f"weight_{k}"] = _amount(leaf.get("weight", {"value": 1.0}))
-    return result
+    asked = [leaf["sockets"].get(name, {}) for leaf in emitting for name in ("Emission Color", "Emission Strength")]
+    return bool(emitting) and (is_mixed(material) or any(socket.get("graph") for socket in asked))
 
 
 def _emits(sockets: Mapping[str, Mapping[str, Any]]) -> bool:

@@ -25,9 +25,9 @@ from .face_points import FacePoints
 class Glow(mi.Emitter):
     """Properties: `radiance`, linear Rec.709, a colour or a texture over the shape it belongs to.
 
-    `layered` (false) is whether what the shape's BSDF has above takes its part of that, by its `emission_share`, else
-    by alpha. What is `of_surface` (false) has no radiance of its own: it is what the BSDF says that it has `emitted`,
-    times `scale` (1), so that whoever changes the BSDF changes the light.
+    `layered` (false) is whether what the shape's BSDF has above takes its part of that: by what it has `emitted` of 1,
+    if it can say, else by alpha. What is `of_surface` (false) has no radiance of its own: it is what the BSDF says that
+    it has `emitted`, times `scale` (1), so that whoever changes the BSDF changes the light.
     """
 
     def __init__(self, props: mi.Properties) -> None:
@@ -51,7 +51,7 @@ class Glow(mi.Emitter):
     def _sent(self, si: mi.SurfaceInteraction3f, active: Any, *, sampled: bool) -> mi.Color3f:
         """The radiance towards `si.wi`, perhaps to a point that has `sampled` the light."""
         if self.of_surface:
-            return self.get_shape().bsdf().emitted(si, active, sampled=sampled) * self.scale
+            return dr.maximum(self.get_shape().bsdf().emitted(si, active, sampled=sampled), 0) * self.scale
         return self.radiance.eval(si, active) * self._share(si, active, sampled=sampled)
 
     def _share(self, si: mi.SurfaceInteraction3f, active: Any = True, *, sampled: bool) -> mi.Color3f:
@@ -59,8 +59,9 @@ class Glow(mi.Emitter):
         if not self.layered:
             return mi.Color3f(1.0)
         bsdf: Any = self.get_shape().bsdf()
-        if hasattr(bsdf, "emission_share"):
-            return bsdf.emission_share(si, active, sampled=sampled)
+        if hasattr(bsdf, "emitted"):
+            one = {"emission_color": mi.Color3f(1.0), "emission_strength": mi.Float(1.0)}
+            return bsdf.emitted(si, active, sampled=sampled, **one)
         return 1.0 - mi.Color3f(bsdf.eval_null_transmission(si, active))
 
     def unlayered(self, si: mi.SurfaceInteraction3f, active: Any = True) -> mi.Color3f:

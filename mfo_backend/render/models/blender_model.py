@@ -18,8 +18,8 @@ from ...material.principled.mix_values import mix_values
 from ...material.principled.principled_dict import (
     blender_principled_dict,
     closure_tree_dict,
+    emits_by_place,
     is_mixed,
-    leaf_radiance_dict,
     socket_value,
 )
 from ...material.principled.principled_parameters import PARAMETER_OF_SOCKET, SOCKET_OF_PARAMETER
@@ -118,18 +118,21 @@ def _opened(target: Target, selection: str | Sequence[str], materials: Materials
     nothing = not isinstance(selection, str) and not selection
     chosen = None if nothing else select_blender_parameters(selection, present=shown.difference(held), linked=linked)
     table = ParameterTable(()) if chosen is None else _labelled(chosen, materials[target.bsdf_id])
-    table = _near_walks(table, _constants(sockets), WALK_SIZES)
+    table = _near_walks(table, _constants(sockets), WALK_SIZES, (STRENGTH,))
     start = table.clip(table.pack(_constants(sockets)))
     return target, table, start
 
 
-def _near_walks(table: ParameterTable, values: Mapping[str, Value], sizes: Collection[str]) -> ParameterTable:
-    """With bounds of these `sizes` around those in the scene: light below the surface is recorded for them."""
+def _near_walks(
+    table: ParameterTable, values: Mapping[str, Value], sizes: Collection[str], strengths: Collection[str]
+) -> ParameterTable:
+    """With bounds of these `sizes` around those in the scene, for which light below the surface is recorded, and of the
+    `strengths` of glows."""
     near = []
     for p in table:
         if p.name == DENSITY and values.get(DENSITY):
             p = replace(p, upper=float(np.ravel(values[DENSITY])[0]) * WALKS_NEAR)
-        if p.name == STRENGTH:
+        if p.name in strengths:
             p = replace(p, upper=(float(np.ravel(values.get(STRENGTH, 0.0))[0]) or 1.0) * WALKS_NEAR)
         if p.name in sizes:
             present = np.maximum(np.ravel(values.get(p.name, p.default)), LEAST_SIZE)
@@ -170,11 +173,11 @@ def _put_material(
         properties = closure_tree_dict(material, properties, version=version)
     _rewrite(bsdf, properties, textures)
     bsdf.set("id", bsdf_id)
-    radiance = leaf_radiance_dict(material, material.get("film_exposure", 1.0))
-    if radiance is not None and is_mixed(material) and GLOW & start.keys():
-        raise BadInputError("The emission of a mix is held: leave it out of the parameters.")
-    if radiance is not None:
-        _replace_radiance(scene, bsdf_id, radiance, textures)
+    if is_mixed(material) and GLOW & start.keys():
+        raise BadInputError("The emission of the fitted shader of a mix is held: leave it out of the parameters.")
+    is_free = mix_values(material) is not None if is_mixed(material) else GLOW & {*start, *material.get("varying", ())}
+    if emits_by_place(material) or (is_free and not is_mixed(material)):
+        _glow_of_surface(scene, bsdf_id, material.get("film_exposure", 1.0), every=bool(is_free))
 
 
 def _prepared(
@@ -189,46 +192,32 @@ def _prepared(
     outer, mix = target.outer, mix_values(material)
     of_fitted = "fitted." if is_mixed(material) else ""
     key_ends = {name: f"{of_fitted}{name}" for name in table.names}
-    if GLOW & {*table.names, *material.get("varying", ())} and not is_mixed(material):
-        _open_emission(scene, target, material.get("film_exposure", 1.0))
     if mix is not None:
-        sizes = [shown for names in mix.leaves.values() for name, shown in names.items() if name in WALK_SIZES]
-        others = _near_walks(ParameterTable(mix.parameters), mix.start, sizes)
+        named = [(name, shown) for names in mix.leaves.values() for name, shown in names.items()]
+        sizes, strengths = ([s for name, s in named if name in kind] for kind in (WALK_SIZES, (STRENGTH,)))
+        others = _near_walks(ParameterTable(mix.parameters), mix.start, sizes, strengths)
         start = np.concatenate([start, others.clip(others.pack(mix.start))])
         table, key_ends = ParameterTable([*table, *others]), key_ends | mix.key_ends
     outer_target = Target(target.shape_id, target.bsdf_id, outer, outer)
     return PreparedMaterial(table, start, outer_target, key_ends, mix)
 
 
-def _open_emission(scene: Element, target: Target, exposure: float) -> None:
-    """Let what has the target's material glow with the emission that its BSDF has at any time, and with no other."""
+def _glow_of_surface(scene: Element, bsdf_id: str, exposure: float, *, every: bool) -> None:
+    """Let shapes of a material glow with what its BSDF emits at any time: those that glow, or `every` one."""
+    owners = {bsdf_id, *(b.get("id") for b in scene.iter("bsdf") if b.get("type") == "normalmap" and _has(b, bsdf_id))}
     for shape in scene.iter("shape"):
-        if shape.get("id") != target.shape_id and not _has_material(shape, target.bsdf_id):
+        emitters = shape.findall("emitter")
+        if not (emitters or every) or not any(_has(shape, owner) for owner in owners):
             continue
-        for emitter in shape.findall("emitter"):
+        for emitter in emitters:
             shape.remove(emitter)
         emitter = ElementTree.SubElement(shape, "emitter", type="blender_glow")
         ElementTree.SubElement(emitter, "boolean", name="of_surface", value="true")
-        ElementTree.SubElement(emitter, "float", name="scale", value=repr(exposure))
+        ElementTree.SubElement(emitter, "float", name="scale", value=repr(float(exposure)))
 
 
-def _has_material(shape: Element, bsdf_id: str) -> bool:
-    return any(ref.get("id") == bsdf_id for ref in shape.findall("ref"))
-
-
-def _replace_radiance(
-    scene: Element, bsdf_id: str, radiance: Mapping[str, Any], textures: Mapping[str, Element]
-) -> None:
-    """Let shapes of a material emit what varies over it, where they emit."""
-    for shape in scene.findall("shape"):
-        if not _has_material(shape, bsdf_id):
-            continue
-        for emitter in shape.findall("emitter"):
-            for child in list(emitter):
-                if child.get("name") == "radiance":
-                    emitter.remove(child)
-            texture = ElementTree.SubElement(emitter, "texture", name="radiance")
-            _rewrite(texture, radiance, textures)
+def _has(element: Element, identifier: str | None) -> bool:
+    return any(ref.get("id") == identifier for ref in element.findall("ref"))
 
 
 def _constants(sockets: Mapping[str, Mapping[str, Any]]) -> dict[str, Value]:

@@ -95,13 +95,13 @@ def record_paths(
         if dr.width(index) == 0:
             raise BadInputError("No pixel sees the target: check the camera and that the object is not hidden.")
         position, filter_weight, ray = rays.position(index), rays.weight(index), rays.ray(index)
-        hit = dr.gather(mi.PreliminaryIntersection3f, ends.met, index)
-        si = hit.compute_surface_interaction(ray, mi.RayFlags.All)
+        si = dr.gather(mi.PreliminaryIntersection3f, ends.met, index).compute_surface_interaction(ray, mi.RayFlags.All)
         share = filter_weight
         if settings.cut_out and settings.mixed:  # its shaders have their shares, holes included
             share = share / dr.maximum(1.0 - dr.mean(shape.bsdf().eval_null_transmission(si)), 1e-6)
         glow = si.emitter(scene).eval(si) * share if shape.is_emitter() and not settings.glows else None
-        radiance = shape.emitter().unlayered(si) * filter_weight if settings.glows else None
+        radiance = shape.emitter().unlayered(si) * share if settings.glows else None
+        glow = shape.bsdf().held_emission(si) * radiance if radiance is not None and settings.mixed else glow
         if lamps.seen:
             before = lamps.met(ray, si, mi.Bool(True), camera=True) * filter_weight
             glow = before if glow is None else glow + before

@@ -104,14 +104,14 @@ class RecordedScene:
         self._taken = 0  # bytes for the rays of the largest recording so far
         self._mixed = hasattr(renderer.shape.bsdf(), "held_value")
         glow = renderer.shape.emitter() if renderer.shape.is_emitter() else None
-        layered = getattr(glow, "layered", False)
-        self._glows = layered and not self._mixed and renderer.model == "blender_principled"
+        is_free = renderer.mix is not None if self._mixed else renderer.model == "blender_principled"
+        self._glows = is_free and getattr(glow, "of_surface" if self._mixed else "layered", False)
         bsdf = renderer.shape.bsdf()
         self._walks = renderer.model == "blender_principled" and getattr(bsdf, "has_below", False)
         walks = self._walks and not (self._mixed and bsdf.walks_are_held)
         self.model = recorded_model(renderer.model, bsdf, renderer.mix, glows=self._glows, walks=walks)
         given = values_in_scene(bsdf, self.model)
-        if self._glows and not glow.of_surface:  # lanes have its radiance
+        if self._glows and not getattr(glow, "of_surface", False):  # lanes have its radiance
             given |= {"emission_color": (1.0, 1.0, 1.0), "emission_strength": 1.0}
         cut_out = given.get("alpha", 1.0) != 1.0
         if self._mixed and (cut_out or not bsdf.is_held_in_lanes):

@@ -279,12 +279,12 @@ def _loaded(document: Element, scene_xml: Path, light_paths: LightPaths | None) 
     _forget_scenes_before()
     import mitsuba as mi
 
-    from ...material.plugins import by_ray, closure_tree, leaf_radiance, mapped_normal, principled_plugin
+    from ...material.plugins import by_ray, closure_tree, mapped_normal, principled_plugin
     from ...material.plugins import projective_texture as projective
     from ..lamps import lamp_plugins
     from ..transport import cycles_path
 
-    of_materials = (by_ray, closure_tree, leaf_radiance, mapped_normal, principled_plugin, projective)
+    of_materials = (by_ray, closure_tree, mapped_normal, principled_plugin, projective)
     for plugins in (*of_materials, cycles_path, lamp_plugins):
         plugins.register()
     has_lamps = any(e.get("type") in lamp_plugins.PLUGINS for e in document.iter("emitter"))

@@ -205,19 +205,19 @@ def halved(flat: np.ndarray) -> np.ndarray:
 def test_a_value_reaches_only_sockets_that_the_fit_knows() -> None:
     """A number linked to every input of a Principled BSDF: one that also fed what no model has ended a fit."""
     from blender_addon.export.nodes.target_shader import DIRECTIONS, target_shader
-    from blender_addon.graph_values.table import NOT_FITTED, graph_values
+    from blender_addon.graph_values.table import LETS_THROUGH, graph_values
     from mfo_backend.render.models.graph_pictures import name_of
 
     material = new_material("Every")
     tree, node = material.node_tree, principled(material)
     number = tree.nodes.new("ShaderNodeMath")
     for socket in node.inputs:
-        if socket.type != "SHADER" and socket.name not in NOT_FITTED:
+        if socket.type != "SHADER" and socket.name not in LETS_THROUGH:
             tree.links.new(number.outputs[0], socket)
     target = target_shader(material)
     assert target is not None
     reached = {name for value in graph_values(target) for name in value.sockets}
-    assert {"Base Color", "Roughness", "Coat Weight", "Subsurface Scale"} <= reached
+    assert {"Base Color", "Roughness", "Coat Weight", "Subsurface Scale", "Emission Color"} <= reached
     assert "Thin Wall" not in reached
     names = {name_of(name) for name in reached - set(DIRECTIONS)}
     assert len(names) == len(reached - set(DIRECTIONS))
@@ -228,12 +228,12 @@ def test_a_value_reaches_only_sockets_that_the_fit_knows() -> None:
     [
         ("Alpha", 0.0, False),
         ("Transmission Weight", 0.0, False),
-        ("Emission Color", 1.0, False),
+        ("Emission Color", 1.0, True),
         ("Emission Color", 0.0, True),
-        ("Emission Strength", 0.0, False),
+        ("Emission Strength", 0.0, True),
     ],
 )
-def test_a_value_that_changes_glow_or_holes_as_well_is_not_offered(also: str, strength: float, offered: bool) -> None:
+def test_a_value_that_changes_holes_as_well_is_not_offered(also: str, strength: float, offered: bool) -> None:
     """The fit holds these: it would find a value for the colour alone, and writing it would change them."""
     from blender_addon.export.nodes.target_shader import target_shader
     from blender_addon.graph_values.table import graph_values

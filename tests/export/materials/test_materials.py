@@ -79,20 +79,6 @@ def test_what_no_model_has_is_listed(scene: Any, export: Any) -> None:
     ]
 
 
-def test_layers_over_the_glow_of_a_mix_are_named(scene: Any, export: Any) -> None:
-    world_color(scene, 1.0)
-    add_camera("ORTHO", ortho_scale=2.0)
-    material = new_material("Mixed", Coat_Weight=0.5, Emission_Strength=2.0)
-    tree = material.node_tree
-    output = tree.get_output_node("CYCLES").inputs["Surface"]
-    mix = tree.nodes.new("ShaderNodeMixShader")
-    tree.links.new(output.links[0].from_socket, mix.inputs[1])
-    tree.links.new(tree.nodes.new("ShaderNodeBsdfDiffuse").outputs[0], mix.inputs[2])
-    tree.links.new(mix.outputs[0], output)
-    notes = export(add_quad("Target", 1.0, 0.0, material)).notes
-    assert "Material 'Mixed': the emission is not dimmed by Coat Weight, as it is in Cycles." in notes
-
-
 def test_pictures_stay_linked(scene: Any, export: Any, mitsuba: Any) -> None:
     """sRGB bytes are decoded, Non-Color is not, float pictures are linear already; channels can be picked."""
     world_color(scene, 1.0)

@@ -22,6 +22,8 @@ from .test_mixed_targets import (  # noqa: E402
     BLUE,
     DIFFUSE,
     GLOSSY,
+    GLOW,
+    GOLD,
     METAL,
     PLASTIC,
     RED,
@@ -38,6 +40,16 @@ from .test_mixed_targets import (  # noqa: E402
 from .test_node_graphs import ball, coordinates, lit_scene  # noqa: E402
 
 COATED = shader("BsdfPrincipled", Base_Color=BLUE, Roughness=0.5, Coat_Weight=1.0, Coat_Roughness=0.3)
+LIT_BELOW_A_COAT = shader(
+    "BsdfPrincipled",
+    Base_Color=BLUE,
+    Emission_Color=GOLD,
+    Emission_Strength=0.4,
+    Coat_Weight=1.0,
+    Coat_Roughness=0.4,
+    Coat_IOR=2.2,
+    Coat_Tint=RED,
+)
 
 
 def displaced(build: Build) -> Build:
@@ -91,6 +103,18 @@ CASES: dict[str, tuple[Any, dict[str, Any]]] = {
     "normals that lean, below a sheen and a coat": (
         mix(0.3, SHEEN, COATED),
         {"Mix Shader/Factor": 0.6, "Principled BSDF/Base Color": RED},
+    ),
+    "a glow and a coated one": (
+        mix(0.4, COATED, GLOW),
+        {"Mix Shader/Factor": 0.7, "Emission/Color": GOLD, "Emission/Strength": 0.6},
+    ),
+    "glows that stay, one below a mask": (
+        add(mix(0.3, DIFFUSE, SHEEN), mix(noise, GLOW, None)),
+        {"Mix Shader/Factor": 0.6},
+    ),
+    "one that glows below its coat": (
+        mix(0.3, DIFFUSE, LIT_BELOW_A_COAT),
+        {"Mix Shader/Factor": 0.8, "Principled BSDF/Base Color": RED},
     ),
     "displaced, the other one bumped": (
         displaced(mix(0.4, DIFFUSE, bumped(GLOSSY, 4.0))),
@@ -149,7 +173,8 @@ def test_pictures_at_other_values_are_cycles(
     factor = mix_node_input(material)
     others = {name.replace("Factor", factor): value for name, value in others.items()}
     target = box(material) if "lean" in name else ball(material)
-    values = [value.name for value in mix_values(target_shader(material)) if value.by_default or value.factor]
+    known = mix_values(target_shader(material))
+    values = [value.name for value in known if value.by_default or value.factor or value.name in others]
     fit = {"parameters": ["base_color", "roughness", *values]}
     report = export(target, fit=fit)
     assert set(others) <= set(named(report.request))

@@ -89,21 +89,25 @@ def test_a_glow_that_nodes_give_is_said_to_be_held(
     request: Any = SimpleNamespace(
         materials={"target_bsdf": SimpleNamespace(sockets=sockets, leaves=())},
         target=SimpleNamespace(bsdf_id="target_bsdf"),
+        graph=SimpleNamespace(values=[SimpleNamespace(name="Ramp/Stop 0", sockets=["Emission Color"])]),
     )
     result: Any = SimpleNamespace(judgement=SimpleNamespace(verdict=verdict), recovered={})
     assert len(held_notes(request, result)) == said
-    result.recovered = {"emission_strength": 2.0}
-    assert held_notes(request, result) == ()
+    for recovered in ({"emission_strength": 2.0}, {"Ramp/Stop 0": (0.1, 0.2, 0.3)}):
+        result.recovered = recovered
+        assert held_notes(request, result) == ()
 
 
 def test_other_shaders_of_a_mix_that_kept_their_values_are_named() -> None:
     """A lampshade whose Translucent BSDF was held lit its wall otherwise: that was all that was said."""
     leaves = tuple(
-        SimpleNamespace(name=name, free=free) for name, free in (("Silk", {}), ("Gloss", {"Roughness": "r"}))
+        SimpleNamespace(name=name, free=free, varies=False)
+        for name, free in (("Silk", {}), ("Gloss", {"Roughness": "r"}))
     )
     request: Any = SimpleNamespace(
         materials={"target_bsdf": SimpleNamespace(sockets={}, leaves=leaves)},
         target=SimpleNamespace(bsdf_id="target_bsdf"),
+        graph=None,
     )
     judged = (SimpleNamespace(verdict=verdict) for verdict in (Verdict.DIFFERENT, Verdict.SAME))
     different, same = (SimpleNamespace(judgement=each, recovered={}) for each in judged)
