@@ -63,6 +63,8 @@ AMOUNTS = {
 OF_SUMS, OF_PRODUCTS = ("ADD", "SUBTRACT", "MULTIPLY_ADD"), ("MULTIPLY", "DIVIDE")
 # Nodes whose own numbers are dials. Those of Math are none: a picture with a factor stays one, and 1 - x an inverse
 DIALS = ("ShaderNodeGroup", "ShaderNodeValue", "ShaderNodeMapRange", "ShaderNodeMix")
+# A glow may be so many times as strong as it is, as by its own socket: nothing says that 1 is the most
+STRONGER = 5.0
 LEFT_OUT = (("ShaderNodeBump", "Filter Width"),)  # how nodes are sampled, and not what they show
 DIRECTION = ("ShaderNodeNormalMap", "Color")  # an input whose colour is a direction
 SCALES = ("Scale", "Distance", "Lacunarity", "Brick Width", "Row Height", "Detail Scale")
@@ -94,8 +96,13 @@ def amounts_of(node: bpy.types.Node) -> tuple[str, ...]:
     return AMOUNTS.get(node.bl_idname, ())
 
 
-def range_of_amount(fed: bpy.types.Node, value: float) -> Range:
-    """The range of a number that a socket of the target gets, or a part of it; `fed` is the node that takes it."""
+def range_of_amount(fed: bpy.types.Node, value: float, *, of_strength: bool = False) -> Range:
+    """The range of a number that a socket of the target gets, or a part of it; `fed` is the node that takes it.
+
+    That `of_strength` is one of a glow's.
+    """
+    if of_strength and value > 0.0:
+        return Range(0.0, STRONGER * value, SETTING)
     operation = getattr(fed, "operation", None)
     if operation in OF_PRODUCTS and 0.0 <= value <= 1.0:
         return Range(0.0, 2.0, SETTING)

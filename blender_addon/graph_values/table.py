@@ -36,7 +36,8 @@ from .tint import IMAGE, TINT_GAIN, TINT_OFFSET, is_tint, tint_of
 
 # what no fit of values inside nodes changes
 LETS_THROUGH = ("Alpha", "Transmission Weight")
-OF_GLOW = ("Emission Color", "Emission Strength")
+STRENGTH = "Emission Strength"
+OF_GLOW = ("Emission Color", STRENGTH)
 VALUE_NODE = "ShaderNodeValue"
 WEIGHT = "Weight"  # the share of a shader in a mix, among the names of its sockets
 MOST = 256  # values of one graph; what lies further upstream is not offered
@@ -148,7 +149,7 @@ def _free_places(shader: TargetShader) -> Iterator[tuple[str, SocketPlace]]:
 
 def without_glow(shader: TargetShader) -> Sequence[str]:
     """The sockets of a shader that say nothing, for it has no light of its own."""
-    strength = shader.places.get("Emission Strength")
+    strength = shader.places.get(STRENGTH)
     is_dark = strength is None or (not strength.socket.is_linked and plain_value(strength.socket) == 0.0)
     return OF_GLOW if is_dark else ()
 
@@ -341,8 +342,9 @@ def _finished(met: _Met, tree: bpy.types.NodeTree) -> GraphValue:
     value = read(tree, place)
     numbers = value if isinstance(value, tuple) else (value,)
     limits = met.range or plain_range(numbers[0])
-    if met.is_amount and limits.group == NUMBER and met.node.bl_idname in DIALS:
-        limits = range_of_amount(met.fed or met.node, numbers[0])
+    of_strength = all(name.rpartition("/")[2] == STRENGTH for name in met.sockets)
+    if met.is_amount and limits.group == NUMBER and (met.node.bl_idname in DIALS or of_strength):
+        limits = range_of_amount(met.fed or met.node, numbers[0], of_strength=of_strength)
     limits = replace(limits, lower=min(limits.lower, *numbers, limits.upper), upper=max(limits.upper, *numbers))
     label, inside = one_word(met.label or met.node.label or met.node.name), one_word(met.inside)
     return GraphValue(f"{label}/{inside}", label, place, limits, tuple(met.sockets))

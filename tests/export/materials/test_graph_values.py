@@ -249,6 +249,26 @@ def test_a_value_that_changes_holes_as_well_is_not_offered(also: str, strength: 
     assert bool(graph_values(target)) is offered
 
 
+def test_a_factor_of_a_glow_is_one_of_all_and_may_be_five_times_as_large() -> None:
+    """Of a mask times a number, as glows are often made; of Roughness that is a picture with a factor, and stays."""
+    from blender_addon.export.nodes.target_shader import target_shader
+    from blender_addon.graph_values.mix_values import default_values
+
+    found = {}
+    for name in ("Emission Strength", "Roughness"):
+        material = new_material(name)
+        tree, node = material.node_tree, principled(material)
+        mask, times = tree.nodes.new("ShaderNodeTexNoise"), tree.nodes.new("ShaderNodeMath")
+        times.operation, times.inputs[1].default_value = "MULTIPLY", 0.8
+        tree.links.new(mask.outputs[0], times.inputs[0])
+        tree.links.new(times.outputs[0], node.inputs[name])
+        target = target_shader(material)
+        assert target is not None
+        values = default_values(target, all_leaves=False)
+        found[name] = {value.name: (value.range.lower, value.range.upper) for value in values}
+    assert found == {"Emission Strength": {"Math/Value 2": (0.0, pytest.approx(4.0))}, "Roughness": {}}
+
+
 def test_a_value_that_reaches_nothing_a_model_has_is_not_offered() -> None:
     from blender_addon.export.nodes.target_shader import target_shader
     from blender_addon.graph_values.table import graph_values
