@@ -17,9 +17,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..export.meshes.read_mesh import material_of_slot
-from ..export.nodes.backs import is_hollow_behind, turns_on_backs
+from ..export.nodes.backs import is_displaced_hollow, turns_on_backs
 from ..export.nodes.dependence import OF_SIDE, OF_SURROUNDINGS, OF_VIEW, asked_for, asked_of_place
-from ..export.nodes.displacement import bends_normals, displacement_of, unbent
+from ..export.nodes.displacement import bends_normals, unbent
 from ..export.nodes.leaf_kinds import EMISSION, distribution_of, is_shader, kind_of, only_nearest, walks_of
 from ..export.nodes.read_alphas import keep_alphas
 from ..probe.closure_tree import ClosureTree, Leaf, Value, own_groups
@@ -285,8 +285,7 @@ class _Bake:
         """Whether the normal of `local_normal` has the opposite direction on back faces."""
         if socket is not None:
             return turns_on_backs(socket)
-        displacement = displacement_of(self._material)
-        return displacement is not None and is_hollow_behind(displacement)
+        return is_displaced_hollow(self._material, by_language=self._stage.scene.cycles.shading_system)
 
     @property
     def _geometry(self) -> bpy.types.NodeSocket:

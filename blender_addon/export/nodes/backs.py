@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import bpy
 
+from .displacement import displacement_of, moves_faces
 from .graph_findings import GROUP, GROUP_INPUT, Groups, feeding, outputs_before
 from .shader_graph import source_of
 
@@ -29,6 +30,20 @@ def turns_on_backs(source: bpy.types.NodeSocket, groups: Groups = ()) -> bool:
         return node.bl_idname == "ShaderNodeNormalMap"
     below = source_of(node.inputs["Normal"])
     return is_hollow_behind(node.inputs["Height"], groups) and (below is None or turns_on_backs(below, groups))
+
+
+def is_displaced_hollow(material: bpy.types.Material, *, by_language: bool = False) -> bool:
+    """Whether what a displacement bends normals by is hollow on back faces where it is raised.
+
+    Where it moves faces, too, Cycles holds the height against the places before that, which it differentiates between
+    vertices (`svm_node_enter_bump_eval`, in 4.2 as in 5.2): such heights have the sign of those places. What it
+    differentiates by `dP` has not, but by Open Shading Language, which knows no other derivative of a place.
+    """
+    displacement = displacement_of(material)
+    if displacement is None:
+        return False
+    is_hollow = is_hollow_behind(displacement)
+    return not (is_hollow or by_language) if moves_faces(material) else is_hollow
 
 
 def is_hollow_behind(height: bpy.types.NodeSocket, groups: Groups = ()) -> bool:
