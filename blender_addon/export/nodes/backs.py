@@ -5,7 +5,8 @@ from __future__ import annotations
 
 import bpy
 
-from .displacement import displacement_of, moves_faces
+from ..findings import Findings
+from .displacement import bends_normals, displacement_of, moves_faces
 from .graph_findings import GROUP, GROUP_INPUT, Groups, feeding, outputs_before
 from .shader_graph import source_of
 
@@ -44,6 +45,19 @@ def is_displaced_hollow(material: bpy.types.Material, *, by_language: bool = Fal
         return False
     is_hollow = is_hollow_behind(displacement)
     return not (is_hollow or by_language) if moves_faces(material) else is_hollow
+
+
+def note_displaced_backs(material: bpy.types.Material, findings: Findings, *, by_language: bool) -> None:
+    """Name a material whose back Cycles mirrors at the normals that its faces had before they moved.
+
+    The fit mirrors it at those that they have: outside of a vase of 12 facets a block of 8 x 8 pixels was 7 % off.
+    """
+    both = moves_faces(material) and bends_normals(material)
+    if both and not is_displaced_hollow(material, by_language=by_language):
+        findings.note(
+            f"Material '{material.name}': on back faces Displacement and Bump bends normals in another way than in "
+            "Cycles. Choose Displacement Only, or turn the faces round, and render the reference anew."
+        )
 
 
 def is_hollow_behind(height: bpy.types.NodeSocket, groups: Groups = ()) -> bool:

@@ -194,6 +194,8 @@ def test_normals_of_a_floor_that_is_seen_from_behind(scene: Any, in_both: Any, k
     assert ours[:8].mean() == pytest.approx(theirs[:8].mean(), rel=0.01)
     turned = [m.get("turned", False) for m in report.request["materials"].values()]
     assert any(turned) == (kind not in ("Position", "Object", "BOTH by UV"))
+    # that is right here alone, where the corners have not moved
+    assert any("on back faces Displacement and Bump" in note for note in report.notes) == (kind == "BOTH by UV")
 
 
 def test_a_bump_leans_along_the_faces_as_a_displacement_has_turned_them(scene: Any, in_both: Any) -> None:
