@@ -29,6 +29,16 @@ def displaced_corners(
     Both are float32 (triangles, 3, 3), normals of any length, as Cycles has them after the displacement: it moves
     vertices and makes normals anew.
     """
+    positions, normals = moved_corners(scene, instance, depsgraph)
+    np.save(folder / "positions.npy", positions)
+    np.save(folder / "normals.npy", normals)
+    return {"positions": "positions.npy", "normals": "normals.npy"}
+
+
+def moved_corners(
+    scene: bpy.types.Scene, instance: bpy.types.DepsgraphObjectInstance, depsgraph: bpy.types.Depsgraph
+) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
+    """Positions and normals of `displaced_corners`."""
     materials: list[bpy.types.Material] = []
     try:
         with staged(scene, instance, depsgraph) as stage:
@@ -56,9 +66,7 @@ def displaced_corners(
             moved = (places + offsets[loops].reshape(-1, 3, 3)).astype(np.float32)
             has_own = is_smooth | bool(mesh.has_custom_normals)
             found = np.where(has_own[:, None, None], normals[loops].reshape(-1, 3, 3), flat_normals(moved))
-            np.save(folder / "positions.npy", moved)
-            np.save(folder / "normals.npy", found.astype(np.float32))
-            return {"positions": "positions.npy", "normals": "normals.npy"}
+            return moved, found.astype(np.float32)
     finally:
         for material in materials:
             bpy.data.materials.remove(material)

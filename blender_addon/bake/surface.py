@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from contextlib import contextmanager
+from functools import cached_property
 from pathlib import Path
 from typing import Any
 
@@ -16,9 +17,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..export.meshes.read_mesh import material_of_slot
-from ..export.nodes.backs import is_hollow_behind, turns_on_backs
+from ..export.nodes.backs import is_displaced_hollow, turns_on_backs
 from ..export.nodes.dependence import OF_SIDE, OF_SURROUNDINGS, OF_VIEW, asked_for, asked_of_place
-from ..export.nodes.displacement import bends_normals, displacement_of, unbent
+from ..export.nodes.displacement import bends_normals, unbent
 from ..export.nodes.leaf_kinds import EMISSION, distribution_of, is_shader, kind_of, only_nearest, walks_of
 from ..export.nodes.read_alphas import keep_alphas
 from ..probe.closure_tree import ClosureTree, Leaf, Value, own_groups
@@ -64,7 +65,8 @@ def baked_surface(
 
     Returns ``corners``, the name of a .npy with UV (triangles, 3, 2) of all triangles of the object; ``leaves``,
     those that reflect light or let it through, each with ``kind``, ``name``, ``weight``, ``sockets`` and what of the
-    node's settings counts; ``emission`` and for leaves ``normal``, where there are any; ``view``, ``paths``,
+    node's settings counts; ``emission`` and for leaves ``normal``, where there are any, and ``shading_normal`` where a
+    displacement bends those that it lies on; ``view``, ``paths``,
     ``around`` and ``place``: what of the view, of light paths, of other objects and of its own place the nodes ask
     for; ``sides``: whether for the side that is seen; ``alone``: whether there is one closure in all; ``left_out``:
     linked sockets that are not baked. A value is a number, a list, or the name of a .npy (size, size, channels), first
@@ -128,13 +130,22 @@ def _leaves(closures: ClosureTree, baked: _Bake) -> list[dict[str, Any]]:
     baked.values(asked)
     for found, leaf in zip(leaves, reflecting, strict=True):
         normal = _normal(closures, leaf)
-        if normal is not None or baked.is_bent:
-            local = baked.local_normal(normal)
-            if np.abs(local[..., :2]).max() > FLAT:
-                found["normal"] = baked.file(local)
-                found["displaced"] = normal is None
-                found["turned"] = baked.turns_on_backs(normal)
+        if normal is None:
+            bent = baked.bent
+            if bent is not None:
+                found |= {"normal": bent, "displaced": True, "turned": baked.turns_on_backs(None)}
+            continue
+        local = baked.local_normal(normal)
+        if baked.bent is not None:  # how far a lobe's normal is from that decides what a bump shades
+            found |= {"shading_normal": baked.bent, "shading_turned": baked.turns_on_backs(None)}
+        if baked.bent is not None or not _is_flat(local):
+            found |= {"normal": baked.file(local), "displaced": False, "turned": baked.turns_on_backs(normal)}
     return leaves
+
+
+def _is_flat(local: Pixels) -> bool:
+    """Whether the normals of a map bend nothing."""
+    return np.abs(local[..., :2]).max() <= FLAT
 
 
 def _normal(closures: ClosureTree, leaf: Leaf) -> Value | None:
@@ -264,17 +275,17 @@ class _Bake:
         is_known = np.linalg.norm(local, axis=2, keepdims=True) > 0.5
         return np.where(is_known, _unit(local), (0.0, 0.0, 1.0)).astype(np.float32)
 
-    @property
-    def is_bent(self) -> bool:
-        """Whether a displacement changes the normals of all lobes."""
-        return bends_normals(self._material)
+    @cached_property
+    def bent(self) -> str | None:
+        """The file of the normals that a displacement by bump makes for all lobes, None where it bends nothing."""
+        local = self.local_normal(None) if bends_normals(self._material) else None
+        return None if local is None or _is_flat(local) else self.file(local)
 
     def turns_on_backs(self, socket: bpy.types.NodeSocket | None) -> bool:
         """Whether the normal of `local_normal` has the opposite direction on back faces."""
         if socket is not None:
             return turns_on_backs(socket)
-        displacement = displacement_of(self._material)
-        return displacement is not None and is_hollow_behind(displacement)
+        return is_displaced_hollow(self._material, by_language=self._stage.scene.cycles.shading_system)
 
     @property
     def _geometry(self) -> bpy.types.NodeSocket:

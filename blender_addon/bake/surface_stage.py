@@ -12,7 +12,9 @@ import numpy as np
 from mathutils import Matrix  # pyright: ignore[reportMissingImports]
 from numpy.typing import NDArray
 
-from ..export.meshes.read_mesh import slot_count
+from ..export.meshes.read_mesh import material_of_slot, slot_count
+from ..export.nodes.displacement import moves_faces
+from .displaced import moved_corners
 from .stage import Stage, staged
 from .unwrap import unwrapped
 
@@ -50,6 +52,9 @@ def surface_stage(
 ) -> Iterator[SurfaceStage]:
     """The object of an instance alone, with a UV map for the faces in `slot`, which have `material`."""
     last = max(slot_count(instance.object) - 1, 0)
+    slots = [material_of_slot(instance.object, number) for number in range(last + 1)]
+    is_moved = any(shown is not None and moves_faces(shown.original) for shown in slots)
+    moved = moved_corners(scene, instance, depsgraph)[0] if is_moved else None
     blank = bpy.data.materials.new("material_fit_blank")
     try:
         with staged(scene, instance, depsgraph) as stage:
@@ -67,7 +72,7 @@ def surface_stage(
             layer = mesh.uv_layers.new(name=UV_MAP, do_init=False)
             layer.uv.foreach_set("vector", uv.reshape(-1))
             mesh.uv_layers.active = layer
-            corners = _add_tangents(mesh, uv, instance.matrix_world)
+            corners = _add_tangents(mesh, uv, instance.matrix_world, moved)
             mesh.materials.clear()
             for number in range(last + 1):
                 mesh.materials.append(material if number == slot else blank)
@@ -77,8 +82,13 @@ def surface_stage(
         bpy.data.materials.remove(blank)
 
 
-def _add_tangents(mesh: bpy.types.Mesh, uv: NDArray[np.float32], matrix: Matrix) -> NDArray[np.float32]:
-    """Give `mesh` dp/du of the map `uv` as an attribute in world space; returns uv by triangle (triangles, 3, 2)."""
+def _add_tangents(
+    mesh: bpy.types.Mesh, uv: NDArray[np.float32], matrix: Matrix, moved: NDArray[np.float32] | None
+) -> NDArray[np.float32]:
+    """Give `mesh` dp/du of the map `uv` as an attribute in world space; returns uv by triangle (triangles, 3, 2).
+
+    Where a displacement moves its triangles it is that of their corners where they have `moved`.
+    """
     mesh.calc_loop_triangles()
     count = len(mesh.loop_triangles)
     loops, vertices = np.empty(count * 3, dtype=np.int32), np.empty(len(mesh.loops), dtype=np.int32)
@@ -86,9 +96,10 @@ def _add_tangents(mesh: bpy.types.Mesh, uv: NDArray[np.float32], matrix: Matrix)
     mesh.loops.foreach_get("vertex_index", vertices)
     places = np.empty(len(mesh.vertices) * 3, dtype=np.float32)
     mesh.vertices.foreach_get("co", places)
+    shown = places.reshape(-1, 3)[vertices[loops]].reshape(-1, 3, 3) if moved is None else moved
     linear = np.array(matrix.to_3x3(), dtype=np.float64)
     corners = uv[loops].reshape(-1, 3, 2)
-    points = places.reshape(-1, 3)[vertices[loops]].reshape(-1, 3, 3) @ linear.T
+    points = shown @ linear.T
     along, across = points[:, 1] - points[:, 0], points[:, 2] - points[:, 0]
     (u1, v1), (u2, v2) = (corners[:, 1] - corners[:, 0]).T, (corners[:, 2] - corners[:, 0]).T
     sign = np.sign(u1 * v2 - u2 * v1)[:, None]

@@ -11,6 +11,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+# what bent normals are called among the sockets of a material, which have no such name
+SHADING_NORMAL = "Shading Normal"
+
 
 @dataclass(frozen=True)
 class Texture:

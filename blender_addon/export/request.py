@@ -131,8 +131,8 @@ def _socket(socket: Socket, files: SceneFiles, seen: bool) -> dict[str, Any]:
         described["graph"] = f"{GRAPH_FOLDER}/{socket.seen.name}"
         if socket.elsewhere is not None:
             described["elsewhere"] = f"{GRAPH_FOLDER}/{socket.elsewhere.name}"
-        if socket.turned:
-            described["turned"] = True
+    if socket.turned and ("texture" in described or "graph" in described):
+        described["turned"] = True
     return described
 
 

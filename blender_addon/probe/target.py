@@ -16,9 +16,10 @@ from numpy.typing import NDArray
 
 from ..export.camera.camera_model import Region
 from ..export.images.color_space import to_rec709
+from ..export.material_model import SHADING_NORMAL
 from ..export.nodes.closure_leaves import OUTPUT
 from ..export.nodes.dependence import OF_FACING, asked_for
-from ..export.nodes.displacement import SHADING_NORMAL, bends_normals, moves_faces
+from ..export.nodes.displacement import bends_normals, moves_faces
 from ..export.nodes.leaf_kinds import TRANSPARENT
 from ..export.nodes.shader_graph import source_of
 from ..export.render_state import render_state, shown_object

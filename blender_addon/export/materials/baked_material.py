@@ -15,7 +15,7 @@ from ...probe.light_path import BEHIND, OF_RAYS
 from ..findings import Findings
 from ..images.color_space import to_rec709
 from ..lights.light_model import takes_light
-from ..material_model import Material, Part, Socket, Texture
+from ..material_model import SHADING_NORMAL, Material, Part, Socket, Texture
 from ..nodes.circling import TURNED
 from ..nodes.leaf_kinds import CONDUCTOR, KINDS, TRANSPARENT
 from .leaf_sockets import GLOSSY, HELD, conductor_colors, stretched
@@ -110,9 +110,10 @@ class Baked:
             sockets["Emission Strength"] = Socket(0.0)
         if self._circles:
             sockets["Tangent"] = Socket([0.0, 0.0, 0.0], True, by_mesh=True)
-        normal = None
-        if "normal" in leaf:
-            normal = _texture((0.5 * np.load(self._folder / leaf["normal"]) + 0.5).astype(np.float32))
+        normal = self._normals(leaf["normal"]) if "normal" in leaf else None
+        if "shading_normal" in leaf:
+            bent = self._normals(leaf["shading_normal"])
+            sockets[SHADING_NORMAL] = Socket([0.0, 0.0, 0.0], True, bent, turned=bool(leaf["shading_turned"]))
         return Material(
             name,
             "principled",
@@ -159,6 +160,9 @@ class Baked:
         if isinstance(value, list):
             return Socket([float(number) for number in to_rec709(value)])
         return Socket(value)
+
+    def _normals(self, name: str) -> Texture:
+        return _texture((0.5 * np.load(self._folder / name) + 0.5).astype(np.float32))
 
     def _array(self, value: Any) -> NDArray[np.float64]:
         """A value per channel, (height, width, 3), one of them where it is the same everywhere."""

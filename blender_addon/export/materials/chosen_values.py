@@ -21,8 +21,7 @@ from ..camera.camera_model import Region, edges_of
 from ..camera.render_region import picture_size
 from ..findings import ExportError, Findings
 from ..fitted_slot import FittedSlot
-from ..material_model import Material
-from ..nodes.displacement import SHADING_NORMAL
+from ..material_model import SHADING_NORMAL, Material
 from ..nodes.graph_findings import graph_problem
 from ..nodes.leaf_kinds import CLEAR_SHADERS, KINDS, OPAQUE, is_numbered
 from ..nodes.shader_graph import plain_value

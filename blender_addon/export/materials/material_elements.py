@@ -11,7 +11,7 @@ import numpy as np
 
 from ..files.xml_scene import Element, add, bitmap, boolean, plugin, reference, rgb, scalar, transform
 from ..findings import Findings
-from ..material_model import Material, Part, Socket, Texture
+from ..material_model import SHADING_NORMAL, Material, Part, Socket, Texture
 from .principled_mapping import UNMATCHED, sockets_to_mitsuba
 
 # sockets whose pictures Mitsuba's model can take as they are
@@ -134,7 +134,7 @@ def _principled(material: Material, save: Callable[[Texture], str], findings: Fi
         if socket.texture is not None and name in TEXTURED
     }
     for name, socket in material.sockets.items():
-        if socket.texture is not None and name not in (*TEXTURED, "Alpha", "Emission Color"):
+        if socket.texture is not None and name not in (*TEXTURED, "Alpha", "Emission Color", SHADING_NORMAL):
             findings.note_of_mitsuba(
                 f"Material '{material.name}': scene.xml has the average of the picture on {name}, which Mitsuba's "
                 "principled cannot take as a picture."

@@ -15,11 +15,11 @@ from ...versions import PRINCIPLED, cycles_settings, node_tree_of
 from ..audit.rules import name_settings
 from ..audit.shading_table import MATERIAL, MATERIAL_CYCLES
 from ..findings import Findings, Fix
-from ..material_model import Material, Socket
-from ..nodes.backs import is_hollow_behind, turns_on_backs
+from ..material_model import SHADING_NORMAL, Material, Socket
+from ..nodes.backs import is_displaced_hollow, turns_on_backs
 from ..nodes.closure_leaves import OUTPUT, UNKNOWN, ClosureLeaf
 from ..nodes.dependence import OF_SIDE, asked_for, asked_of_side
-from ..nodes.displacement import SHADING_NORMAL, bends_normals, displacement_of
+from ..nodes.displacement import bends_normals, displacement_of
 from ..nodes.graph_findings import graph_problem, note_few_samples, note_missing_pictures, note_pixel_sizes
 from ..nodes.leaf_kinds import (
     EMISSION,
@@ -118,7 +118,7 @@ def _read_displacement(
     problem = graph_problem(displacement, is_copied=True)
     if problem is not None:
         findings.error(f"Displacement of material '{material.name}' is linked to {problem}: mend or unlink it.")
-    bent, turned = (found, *found.leaves) if bends_normals(material) else (), is_hollow_behind(displacement)
+    bent, turned = (found, *found.leaves) if bends_normals(material) else (), is_displaced_hollow(material)
     for leaf in bent:
         if leaf.model == "principled":
             leaf.sockets[SHADING_NORMAL] = Socket([0.0, 0.0, 0.0], True, by_graph=True, turned=turned)

@@ -11,9 +11,6 @@ import bpy
 from ...versions import active_output, node_tree_of
 from .shader_graph import source_of
 
-# what bent normals are called among the sockets of a material, which have no such name
-SHADING_NORMAL = "Shading Normal"
-
 
 def displacement_of(material: bpy.types.Material | None) -> bpy.types.NodeSocket | None:
     """The input that what displaces a material is linked to, None where nothing is."""

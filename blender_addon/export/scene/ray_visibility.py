@@ -8,6 +8,7 @@ from dataclasses import replace
 
 import bpy
 
+from ...probe.light_path import BEHIND
 from ...versions import cycles_settings, divides_adaptively
 from ..audit.object_table import OBJECT_CYCLES
 from ..audit.rules import name_settings
@@ -84,7 +85,14 @@ def put_looks(
     if scattered not in data.materials:  # its bake has failed
         return
     others = {rays: look for rays, look in looks.items() if rays != "camera"}
-    data.materials[identifier] = _by_ray(data.materials[scattered], {"scattered": scattered} | others, findings)
+    if BEHIND in others and _walks_below(data, data.materials[scattered]):  # its front is what is mostly seen
+        findings.note(
+            f"Material '{name}' is another from behind: light travels below its surface, and in the fit both sides are "
+            "as its front is."
+        )
+        data.materials[identifier] = data.materials.pop(scattered)
+        return
+    data.materials[identifier] = _by_ray(data, scattered, {"scattered": scattered} | others, findings)
     if "camera" not in looks:
         return
     if data.materials[looks["camera"]].model != "null":
@@ -101,14 +109,14 @@ def hide_from_rays(data: SceneData, findings: Findings) -> None:
     for number, shape in enumerate(data.shapes):
         if not shape.hidden.rays:
             continue
-        material, rays = data.materials[shape.bsdf], set(shape.hidden.rays)
+        rays = set(shape.hidden.rays)
         if shape in data.emitting:
             note_hidden(shape.hidden, findings)
             continue
         looks = {kind: NOTHING if hides <= rays else shape.bsdf for kind, hides in PASSING.items()}
         looks |= dict.fromkeys(("camera", "shadow"), shape.bsdf)
         identifier = "_".join((shape.bsdf, "without", *shape.hidden.rays))
-        data.materials |= {NOTHING: Material(NOTHING, "null"), identifier: _by_ray(material, looks, findings)}
+        data.materials |= {NOTHING: Material(NOTHING, "null"), identifier: _by_ray(data, shape.bsdf, looks, findings)}
         data.shapes[number] = replace(shape, bsdf=identifier)
 
 
@@ -118,9 +126,15 @@ def note_hidden(hidden: Hidden, findings: Findings) -> None:
         findings.note(f"Object '{hidden.owner}' is hidden from {', '.join(hidden.rays)} rays; in the fit it is not.")
 
 
-def _by_ray(material: Material, looks: Mapping[str, str], findings: Findings) -> Material:
-    """A material of several looks that glows as `material` does."""
-    if material.scattering:
+def _walks_below(data: SceneData, material: Material) -> bool:
+    """Whether light travels below a surface; of a mix of bakes it does not."""
+    return bool((data.materials[material.parts[0].bsdf] if material.model == "bumped" else material).scattering)
+
+
+def _by_ray(data: SceneData, like: str, looks: Mapping[str, str], findings: Findings) -> Material:
+    """A material of several looks that glows as the one of the id `like` does."""
+    material = data.materials[like]
+    if _walks_below(data, material):
         findings.note(
             f"Material '{material.name}' is another to some rays: its Subsurface is shown as diffuse, no light travels "
             "below the surface."

@@ -21,7 +21,7 @@ from ...bake.requests import name_of
 from ...bake.stage import color_of
 from ...probe.client import Probe
 from ...probe.light_path import BEHIND, OF_CAMERA, other_looks
-from ...versions import node_tree_of
+from ...versions import cycles_settings, node_tree_of
 from ..camera.camera_model import Camera
 from ..findings import Findings
 from ..images.color_space import to_rec709
@@ -34,6 +34,7 @@ from ..materials.read_context import read_context
 from ..materials.read_material import volume_sockets
 from ..meshes.mesh_arrays import Piece
 from ..meshes.read_mesh import material_of_slot
+from ..nodes.backs import note_displaced_backs
 from ..nodes.circling import turned_axis
 from ..nodes.dependence import (
     OF_INSTANCER_COLOR,
@@ -109,6 +110,8 @@ class SceneBakes:
     """Requests to a Blender beside this one: that of `probe`, or one that lives from the first of them to the end."""
 
     def __init__(self, context: bpy.types.Context, probe: Probe | None = None) -> None:
+        cycles = cycles_settings(context.scene)
+        self._by_language = cycles is not None and cycles.shading_system
         self._baker = Baker(context.scene.name, rendered_layer(context.scene, context.view_layer).name, probe)
         self.displaced = DisplacedMeshes(self._baker)
         self.lamps = LampTables(self._baker)
@@ -175,6 +178,8 @@ class SceneBakes:
                 data.materials[identifier] = grey(material.name)
                 asked = self._surfaces[identifier] = _Asked(material, item.name, request)
                 others = other_looks(node_tree_of(material)) or _looks_behind(data.camera, surface)
+                if _back_is_met(data.camera, surface):
+                    note_displaced_backs(material, findings, by_language=self._by_language)
                 asked.looks = {rays: f"{identifier}_{of}" for rays, of in others.items()}
                 for of in dict.fromkeys(others.values()):
                     self._surfaces[f"{identifier}_{of}"] = _Asked(material, item.name, request | {"rays": of})
@@ -319,10 +324,13 @@ def _own_of_place(surface: Surface, tree: bpy.types.NodeTree) -> Own:
 def _looks_behind(camera: Camera, surface: Surface) -> dict[str, str]:
     """Another look of a surface's back, where nodes give it one and something may meet it; see `other_looks`."""
     tree = node_tree_of(surface.material)
-    if tree is None or not differs_behind(tree):
-        return {}
-    is_met = surface.piece.mesh.is_open or lets_light_through(tree) or surface.piece.may_hold(camera.world[:3, 3])
-    return {BEHIND: BEHIND} if is_met else {}
+    return {BEHIND: BEHIND} if tree is not None and differs_behind(tree) and _back_is_met(camera, surface) else {}
+
+
+def _back_is_met(camera: Camera, surface: Surface) -> bool:
+    tree, piece = node_tree_of(surface.material), surface.piece
+    is_clear = tree is not None and lets_light_through(tree)
+    return is_clear or piece.mesh.is_open or piece.may_hold(camera.world[:3, 3])
 
 
 def _texels(camera: Camera, piece: Piece) -> int:

@@ -56,6 +56,12 @@ def blender_principled_dict(
     for socket, content in sockets.items():
         if socket in DIRECTIONS and content.get("graph"):
             result[DIRECTIONS[socket]] = projective(content, [0.0, 0.0, 0.0])
+        elif socket in DIRECTIONS and content.get("texture"):
+            result[DIRECTIONS[socket]] = {
+                "type": "mapped_normal",
+                "map": picture(content),
+                "turned": bool(content.get("turned")),
+            }
         if socket == "Tangent" and content.get("mesh"):
             result[DIRECTIONS[socket]] = {"type": "mesh_attribute", "name": MESH_TANGENT}
         if socket in _IGNORED or socket in DIRECTIONS:

@@ -95,11 +95,8 @@ def _put_normal_maps(scene: Element, materials: Materials) -> None:
         bsdf.extend(copy.deepcopy(child) for child in below)
         content = materials.get(below.get("id", ""), {})
         name = "shading_normal" if content.get("displaced") else "normal"
-        direction = ElementTree.SubElement(bsdf, "texture", type="mapped_normal", name=name)
-        if content.get("turned"):
-            ElementTree.SubElement(direction, "boolean", name="turned", value="true")
         normals.attrib["name"] = "map"
-        direction.append(normals)
+        _add_mapped_normal(bsdf, name, normals, turned=bool(content.get("turned")))
 
 
 def _opened(target: Target, selection: str | Sequence[str], materials: Materials) -> Opened:
@@ -254,19 +251,32 @@ def _rewrite(bsdf: Element, properties: Mapping[str, Any], textures: Mapping[str
             _rewrite(ElementTree.SubElement(bsdf, "bsdf", name=name), value, textures)
         elif isinstance(value, Mapping) and value["type"] == "projective":
             bsdf.append(_projective(name, value))
+        elif isinstance(value, Mapping) and value["type"] == "mapped_normal":
+            _add_mapped_normal(bsdf, name, _picture("map", value["map"], textures), turned=value["turned"])
         elif isinstance(value, Mapping) and value["type"] == "mesh_attribute":
             texture = ElementTree.SubElement(bsdf, "texture", type="mesh_attribute", name=name)
             ElementTree.SubElement(texture, "string", name="name", value=value["name"])
         elif isinstance(value, Mapping) and value["type"] == "rgb":
             ElementTree.SubElement(bsdf, "rgb", name=name, value=", ".join(map(repr, value["value"])))
         elif isinstance(value, Mapping):
-            file = PurePosixPath(value["filename"]).name
-            texture = copy.deepcopy(textures[file]) if file in textures else _bitmap(value["filename"])
-            texture.attrib.pop("id", None)
-            texture.set("name", name)
-            bsdf.append(texture)
+            bsdf.append(_picture(name, value, textures))
         else:
             ElementTree.SubElement(bsdf, "float", name=name, value=repr(float(value)))
+
+
+def _add_mapped_normal(bsdf: Element, name: str, normals: Element, *, turned: bool) -> None:
+    direction = ElementTree.SubElement(bsdf, "texture", type="mapped_normal", name=name)
+    if turned:
+        ElementTree.SubElement(direction, "boolean", name="turned", value="true")
+    direction.append(normals)
+
+
+def _picture(name: str, properties: Mapping[str, Any], textures: Mapping[str, Element]) -> Element:
+    file = PurePosixPath(properties["filename"]).name
+    texture = copy.deepcopy(textures[file]) if file in textures else _bitmap(properties["filename"])
+    texture.attrib.pop("id", None)
+    texture.set("name", name)
+    return texture
 
 
 def _projective(name: str, properties: Mapping[str, Any]) -> Element:

@@ -90,7 +90,7 @@ def probed(
     exits = kept.compute_surface_interaction(line, mi.RayFlags.All, out)
     # outside is the side of the mesh that is seen
     outside = dr.mulsign(mi.Vector3f(exits.n), dr.dot(si.n, si.to_world(si.wi)))
-    exits.sh_frame = mi.Frame3f(dr.mulsign(mi.Vector3f(exits.sh_frame.n), dr.dot(exits.n, outside)))
+    exits.sh_frame.n = dr.mulsign(exits.sh_frame.n, dr.dot(exits.n, outside))
     exits.wi = exits.to_local(outside)
     likely = dr.select(out, density * held_bright / (total * kept_share), 1.0)
     return exits, out, (on_disk, kept_distance, dr.log(likely))

@@ -118,7 +118,7 @@ def walked(
     )
     exits = found.compute_surface_interaction(mi.Ray3f(p, d, dr.inf, 0.0, mi.Color0f()), mi.RayFlags.All, out)
     # as Cycles turns them, by the triangle's own side: a smooth normal may well look away from the walk
-    exits.sh_frame = mi.Frame3f(dr.mulsign(mi.Vector3f(exits.sh_frame.n), dr.dot(exits.n, d)))
+    exits.sh_frame.n = dr.mulsign(exits.sh_frame.n, dr.dot(exits.n, d))  # its axes are those of normal maps
     exits.wi = exits.to_local(d)
     count = mi.Float(collisions)
     passed = dr.log(survival) * dr.maximum(count - SPARED_COLLISIONS, 0.0)
