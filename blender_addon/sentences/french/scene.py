@@ -138,6 +138,7 @@ SCENE = {
     "Some instances of '{}' cast shadows and others do not; in the fit all are as the first of them.": "Certaines instances de '{}' projettent des ombres et d'autres non ; dans l'ajustement, toutes sont comme la première.",
     "Particles '{}' of '{}' are as the viewport shows them; Cycles may show more. Set Viewport Display to Rendered and its Amount to 100 %.": "Les particules '{}' de '{}' sont telles que la vue les montre ; Cycles en montre peut-être plus. Régler l'affichage de la vue sur Rendu et sa quantité sur 100 %.",
     "Geometry nodes of '{}' ask whether they are for the viewport (Is Viewport): the fit has what they make there, Cycles what they make for a render.": "Les nœuds de géométrie de '{}' demandent s'ils sont pour la vue (Is Viewport) : l'ajustement a ce qu'ils y font, Cycles ce qu'ils font pour un rendu.",
+    "Object '{}' is a holdout or shadow catcher, so pictures do not show its material: turn that off in Object Properties > Visibility.": "L'objet '{}' est une réserve ou un capteur d'ombres, donc les images ne montrent pas son matériau : désactiver cela dans Object Properties > Visibility.",
     "Object '{}' is a holdout or shadow catcher; in the fit it is an object.": "L'objet '{}' est une réserve ou un capteur d'ombres ; dans l'ajustement c'est un objet.",
     "Object '{}' is a {}, which is not exported.": "L'objet '{}' est du type {}, qui n'est pas exporté.",
     "Object '{}' is hidden from camera rays: let the camera see it.": "L'objet '{}' est caché aux rayons de la caméra : laisser la caméra le voir.",

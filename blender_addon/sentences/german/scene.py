@@ -139,6 +139,7 @@ SCENE = {
     "Some instances of '{}' cast shadows and others do not; in the fit all are as the first of them.": "Einige Instanzen von '{}' werfen Schatten und andere nicht; in der Anpassung sind alle wie die erste.",
     "Particles '{}' of '{}' are as the viewport shows them; Cycles may show more. Set Viewport Display to Rendered and its Amount to 100 %.": "Die Partikel '{}' von '{}' sind, wie der Viewport sie zeigt; Cycles zeigt vielleicht mehr. Ansichtsfensteranzeige auf Gerendert und ihre Menge auf 100 % setzen.",
     "Geometry nodes of '{}' ask whether they are for the viewport (Is Viewport): the fit has what they make there, Cycles what they make for a render.": "Die Geometrie-Nodes von '{}' fragen, ob sie für den Viewport sind (Is Viewport): Die Anpassung hat, was sie dort machen, Cycles, was sie für einen Render machen.",
+    "Object '{}' is a holdout or shadow catcher, so pictures do not show its material: turn that off in Object Properties > Visibility.": "Objekt '{}' ist eine Aussparung oder ein Schattenfänger, und Bilder zeigen sein Material nicht: das unter Object Properties > Visibility ausschalten.",
     "Object '{}' is a holdout or shadow catcher; in the fit it is an object.": "Objekt '{}' ist eine Aussparung oder ein Schattenfänger; in der Anpassung ist es ein Objekt.",
     "Object '{}' is a {}, which is not exported.": "Objekt '{}' ist vom Typ {}, der nicht exportiert wird.",
     "Object '{}' is hidden from camera rays: let the camera see it.": "Objekt '{}' ist vor Kamerastrahlen verborgen: die Kamera es sehen lassen.",
