@@ -76,7 +76,7 @@ class Baked:
         for number, (share, material) in enumerate(weighted):
             parts.append(Part(share, f"{identifier}_{number}"))
             found |= _with_normal(parts[-1].bsdf, material, {})
-        return found | {identifier: Material(name, "mix", emission, parts=tuple(parts))}
+        return found | {identifier: Material(name, "mix", emission, parts=tuple(parts), emission_is_dimmed=True)}
 
     def _leaf(self, leaf: Mapping[str, Any], name: str, findings: Findings) -> Material:
         given = leaf["sockets"]
@@ -222,6 +222,7 @@ def _with_normal(identifier: str, material: Material, emission: dict[str, Socket
         return {identifier: material}
     below, weight = f"{identifier}_flat", np.ones((1, 1, 1), np.float32)
     bumped = Material(material.name, "bumped", emission, parts=(Part(weight, below),), normal=material.normal)
+    bumped = replace(bumped, emission_is_dimmed=material.emission_is_dimmed)
     return {below: replace(material, normal=None), identifier: bumped}
 
 

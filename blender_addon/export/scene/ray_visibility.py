@@ -48,8 +48,10 @@ def hidden_from(instance: bpy.types.DepsgraphObjectInstance) -> tuple[str, ...]:
     return tuple(kind for kind in kinds if not all(getattr(each, f"visible_{kind}") for each in owners))
 
 
-def note_visibility(instance: bpy.types.DepsgraphObjectInstance, findings: Findings) -> None:
-    """Name what of an instance is left out."""
+def note_visibility(
+    instance: bpy.types.DepsgraphObjectInstance, findings: Findings, *, is_fitted: bool = False
+) -> None:
+    """Name what of an instance is left out; of one that is fitted some of that is an error."""
     item, parent = instance.object, shown_by(instance)
     name_settings(OBJECT_CYCLES, cycles_settings(item), item.name, findings)
     if any(divides_adaptively(modifier, item) for modifier in item.modifiers):
@@ -59,7 +61,13 @@ def note_visibility(instance: bpy.types.DepsgraphObjectInstance, findings: Findi
     for system in item.particle_systems:
         if system.settings.type == "HAIR" and system.settings.render_type == "PATH":
             findings.note(f"The hair '{system.name}' of '{item.name}' is left out.")
-    if any(each.is_holdout or each.is_shadow_catcher for each in (item, parent)):
+    is_cut = any(each.is_holdout or each.is_shadow_catcher for each in (item, parent))
+    if is_cut and is_fitted:
+        findings.error(
+            f"Object '{item.name}' is a holdout or shadow catcher, so pictures do not show its material: turn that off "
+            "in Object Properties > Visibility."
+        )
+    elif is_cut:
         findings.note(f"Object '{item.name}' is a holdout or shadow catcher; in the fit it is an object.")
 
 

@@ -316,12 +316,12 @@ class _Walk:
         mesh = self.meshes[key]
         if mesh is None:
             return
-        note_visibility(instance, self.findings)
         hidden, rays = camera_misses(instance, self.depsgraph.view_layer), Hidden(item.name, hidden_from(instance))
         last = max(slot_count(item) - 1, 0)
         slots = np.clip(mesh.slots, 0, last)
         bsdfs = {int(slot): self._bsdf(item, int(slot)) for slot in np.unique(slots)}
         fitted = self._fitted(item, bsdfs) if own else {}
+        note_visibility(instance, self.findings, is_fitted=bool(fitted))
         body = self._body(bsdfs)
         for slot, bsdf in bsdfs.items():
             piece = Piece(mesh, slots == slot, matrix)

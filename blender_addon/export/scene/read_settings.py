@@ -37,7 +37,10 @@ def read_settings(scene: bpy.types.Scene, findings: Findings) -> RenderSettings:
         findings.note("Cycles is switched off in the preferences; its default settings are used.")
         return RenderSettings(pixel_filter, 14, scene.render.film_transparent, 1.0, DEFAULT_SPP)
     if cycles.sample_clamp_direct > 0.0:
-        findings.note("Cycles clamps direct light; the fit does not.")
+        findings.note(
+            "Cycles clamps direct light, so highlights and mirrored lights are darker than in the fit: set Light "
+            "Paths > Clamping > Direct Light to 0 and render the reference again."
+        )
     light_paths = _read_light_paths(cycles, findings)
     # N bounces in Cycles are N + 1 scattering events, which Mitsuba counts as N + 2 segments
     depth = 2 + min(cycles.max_bounces, max(light_paths[f"{kind}_bounces"] for kind in BOUNCES))

@@ -66,7 +66,57 @@ def baked(material: Any) -> None:
     shader.inputs["Coat Tint"].default_value = (0.5, 0.5, 0.5, 1.0)
 
 
-@pytest.mark.parametrize("change", [even, holes, coloured, sprite, baked], ids=lambda change: change.__name__)
+def _mixed(material: Any, shader: Any) -> None:
+    """By a noise that shader and Transparent, of which Transparent takes half."""
+    tree = material.node_tree
+    new, join = tree.nodes.new, tree.links.new
+    clear, inner, outer = new("ShaderNodeBsdfTransparent"), new("ShaderNodeMixShader"), new("ShaderNodeMixShader")
+    outer.inputs[0].default_value = 0.5
+    join(new("ShaderNodeTexNoise").outputs[0], inner.inputs[0])
+    for output, socket in (
+        (shader.outputs[0], inner.inputs[1]),
+        (clear.outputs[0], inner.inputs[2]),
+        (inner.outputs[0], outer.inputs[1]),
+        (clear.outputs[0], outer.inputs[2]),
+        (outer.outputs[0], tree.get_output_node("CYCLES").inputs["Surface"]),
+    ):
+        join(output, socket)
+
+
+def flame(material: Any) -> None:
+    glow = material.node_tree.nodes.new("ShaderNodeEmission")
+    glow.inputs["Color"].default_value, glow.inputs["Strength"].default_value = (1.0, 0.5, 0.2, 1.0), 4.0
+    _mixed(material, glow)
+
+
+def pierced(material: Any) -> None:
+    _mixed(material, material.node_tree.get_output_node("CYCLES").inputs["Surface"].links[0].from_node)
+
+
+def dented(material: Any) -> None:
+    """Bumps below a coat, and holes."""
+    baked(material)
+    new, join = material.node_tree.nodes.new, material.node_tree.links.new
+    bump = new("ShaderNodeBump")
+    bump.inputs["Strength"].default_value, bump.inputs["Distance"].default_value = 0.3, 0.1
+    join(new("ShaderNodeTexNoise").outputs[0], bump.inputs["Height"])
+    link(material, bump.outputs[0], "Normal")
+
+
+def added(material: Any) -> None:
+    """As much glow again, of a shader beside it."""
+    dented(material)
+    tree = material.node_tree
+    surface, both = tree.get_output_node("CYCLES").inputs["Surface"], tree.nodes.new("ShaderNodeAddShader")
+    tree.links.new(surface.links[0].from_node.outputs[0], both.inputs[0])
+    tree.links.new(tree.nodes.new("ShaderNodeEmission").outputs[0], both.inputs[1])
+    tree.links.new(both.outputs[0], surface)
+
+
+BAKED = (baked, flame, pierced, dented, added)
+
+
+@pytest.mark.parametrize("change", [even, holes, coloured, sprite, *BAKED], ids=lambda change: change.__name__)
 def test_alpha_dims_what_it_lets_through(
     scene: Any, export: Any, render_cycles: Any, render_mitsuba: Any, change: Any, tmp_path: Path
 ) -> None:
@@ -81,7 +131,7 @@ def test_alpha_dims_what_it_lets_through(
     expected = tiles(render_cycles())
     report = export(target, reference=tmp_path / "cycles.exr")
     # Mitsuba's own principled has no coat that dims
-    shown = np.mean(render_job(report.folder, 512), axis=0) if change is baked else render_mitsuba(report, spp=256)
+    shown = np.mean(render_job(report.folder, 512), axis=0) if change in BAKED else render_mitsuba(report, spp=256)
     found = tiles(shown)
     np.testing.assert_allclose(found.mean(axis=0), expected.mean(axis=0), rtol=0.01)
     np.testing.assert_allclose(found, expected, rtol=0.1, atol=0.02)

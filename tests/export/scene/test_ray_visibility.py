@@ -91,6 +91,23 @@ def test_a_target_that_the_camera_misses_is_refused(scene: Any, export: Any) -> 
         export(item)
 
 
+@pytest.mark.parametrize("flag", ["is_holdout", "is_shadow_catcher"])
+def test_a_target_whose_material_no_picture_shows_is_refused(
+    scene: Any, export: Any, render_cycles: Any, flag: str
+) -> None:
+    """Oracle: Cycles, of which red and blue give the same picture."""
+    lit_scene(scene)
+    item = target()
+    setattr(item, flag, True)
+    pictures = []
+    for color in ((0.9, 0.1, 0.1, 1.0), (0.1, 0.1, 0.9, 1.0)):
+        item.data.materials[0].node_tree.nodes["Principled BSDF"].inputs["Base Color"].default_value = color
+        pictures.append(render_cycles())
+    np.testing.assert_allclose(pictures[0], pictures[1], atol=0.01)
+    with pytest.raises(ExportError, match="'Sphere' is a holdout or shadow catcher, so pictures do not show its"):
+        export(item)
+
+
 def levels(export: Any, render_cycles: Any, target: Any) -> dict[str, Any]:
     """Means of both routes' pictures within the target over Cycles', RGB, less 1."""
     from mfo_backend.render.paths.recorded_scene import RecordedScene
