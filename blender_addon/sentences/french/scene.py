@@ -204,6 +204,7 @@ SCENE = {
     "Material '{}': on back faces Displacement and Bump bends normals in another way than in Cycles. Choose Displacement Only, or turn the faces round, and render the reference anew.": "Matériau '{}' : sur les faces arrière, Displacement and Bump courbe les normales autrement que dans Cycles. Choisir Displacement Only ou retourner les faces, et refaire le rendu de la référence.",
     "Material '{}' asks for Backfacing: in the fit both sides glow as its front does.": "Le matériau '{}' demande Face arrière (Backfacing) : dans l'ajustement, les deux faces brillent comme sa face avant.",
     "Material '{}': {} sees its own object alone in the fit.": "Matériau '{}' : {} ne voit dans l'ajustement que son propre objet.",
+    "Light '{}' casts no shadows and is behind '{}': shiny parts of '{}' get another share of it than in Cycles. Turn its shadows on, or move it, and render the reference anew.": "La lumière '{}' ne projette pas d'ombres et se trouve derrière '{}' : les parties brillantes de '{}' en reçoivent une autre part que dans Cycles. Activer ses ombres ou la déplacer, et refaire le rendu de la référence.",
     "Node '{}' of material '{}' is muted: press M over it in the Shader Editor.": "Le nœud '{}' du matériau '{}' est muet : appuyer sur M au-dessus de lui dans l'éditeur de shaders.",
     "Of the mix '{}' alone is fitted: {}.": "Du mélange, seul '{}' est ajusté : {}.",
     "Shares of the target's shaders: {}; {}.": "Parts des shaders de l'objet : {} ; {}.",

@@ -205,6 +205,7 @@ SCENE = {
     "Material '{}': on back faces Displacement and Bump bends normals in another way than in Cycles. Choose Displacement Only, or turn the faces round, and render the reference anew.": "Material '{}': auf Rückseiten biegt Displacement und Bump die Normalen anders als in Cycles. Nur Displacement wählen oder die Flächen umdrehen, und die Referenz neu rendern.",
     "Material '{}' asks for Backfacing: in the fit both sides glow as its front does.": "Material '{}' fragt nach Rückseite (Backfacing): In der Anpassung leuchten beide Seiten wie die Vorderseite.",
     "Material '{}': {} sees its own object alone in the fit.": "Material '{}': {} sieht in der Anpassung nur das eigene Objekt.",
+    "Light '{}' casts no shadows and is behind '{}': shiny parts of '{}' get another share of it than in Cycles. Turn its shadows on, or move it, and render the reference anew.": "Licht '{}' wirft keine Schatten und liegt hinter '{}': glänzende Teile von '{}' bekommen einen anderen Teil davon als in Cycles. Seine Schatten einschalten oder es verschieben, und die Referenz neu rendern.",
     "Node '{}' of material '{}' is muted: press M over it in the Shader Editor.": "Node '{}' von Material '{}' ist stumm: im Shader-Editor M darüber drücken.",
     "Of the mix '{}' alone is fitted: {}.": "Von der Mischung wird nur '{}' angepasst: {}.",
     "Shares of the target's shaders: {}; {}.": "Anteile der Shader des Materials: {}; {}.",

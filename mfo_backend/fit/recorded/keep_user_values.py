@@ -16,6 +16,7 @@ from ...types.certainty import Certainty, Level
 from ...types.image import Pixels
 from ...types.parameter import ParameterTable
 from ..alike.compare import rival_notes
+from ..alike.hidden_coat import largest_covariance
 from ..alike.unneeded_lobes import box_holding, dispensable, moved_to_user, unneeded_lobes, with_user_details
 from ..certainty.covariance import certainties, covariance, standard_deviations, with_own_light, with_rivals
 from ..result.outcome import kept_note
@@ -52,8 +53,7 @@ def keep_values(end: OnRecording, seen: Callable[[Pixels], float] | None = None)
     table, user = setting.table, setting.user
     found, problem = with_user_details(refined.x, user, table), refined.all
     judged, unseen_change = Judged(setting, refined), _UnseenChange(end.recording, refined, seen)
-    cost, certainty, spread = judged(found)
-    off = list(refined.off)
+    cost, off = judged.cost(found), list(refined.off)
     if not off:
         equations, least = problem.equations(found), judged.model_error
         off = unneeded_lobes(equations, problem.independent, found, user, table, least)
@@ -62,18 +62,19 @@ def keep_values(end: OnRecording, seen: Callable[[Pixels], float] | None = None)
         allowed = cost + SIGNIFICANT * len(moved) * max(cost, judged.model_error**2) / problem.independent
         simpler = _solve_holding(setting, refined, found, off)
         simpler = None if simpler is None else with_user_details(simpler, user, table)
-        if simpler is not None and (again := judged(simpler))[0] <= allowed + 1e-12 and unseen_change(simpler):
-            found, (cost, certainty, spread) = simpler, again
+        if simpler is not None and judged.cost(simpler) <= allowed + 1e-12 and unseen_change(simpler):
+            found, cost = simpler, judged.cost(simpler)
         else:
             off = [name for name in off if name not in moved]
 
+    certainty, spread = judged(found)
     notes: list[str] = []
     unseen = [name for name, c in certainty.items() if c.level is Level.NOT_VISIBLE]
     if unseen and len(unseen) < len(table):
         for back in _sets_to_return(unseen, off, problem, found, user, table):
             held = [*back, *(name for name in off if name not in back)]
             kept = _solve_holding(setting, refined, found, held)
-            if kept is not None and judged(kept)[0] <= AS_GOOD * cost + 1e-8 and unseen_change(kept):
+            if kept is not None and judged.cost(kept) <= AS_GOOD * cost + 1e-8 and unseen_change(kept):
                 found, off = kept, held
                 notes.append(kept_note(back, table))
                 break
@@ -105,19 +106,26 @@ def _sets_to_return(
 
 
 class Judged:
-    """Mean square residual, certainty and covariance at a vector."""
+    """Certainty and covariance at a vector, and what they are taken from."""
 
     def __init__(self, setting: Setting, refined: Refined) -> None:
         self._setting, self._problem, self._rivals = setting, refined.all, refined.rivals
 
-    def __call__(self, x: Vector) -> tuple[float, dict[str, Certainty], NDArray[np.float64]]:
-        """All of them."""
-        problem, table = self._problem, self._setting.table
-        coarser = None if problem.coarser is None else self._rows_of(problem.coarser, x)
-        spread = covariance(*self.rows(x), table, self.model_error, coarser=coarser)
+    def __call__(self, x: Vector) -> tuple[dict[str, Certainty], NDArray[np.float64]]:
+        """Both; of a coat that is not there as if it were where the picture would know least of it."""
+        table = self._setting.table
+        spread = largest_covariance(self._covariance, x, table)
         spread = with_rivals(spread, x, self._rivals, table.width)
         spread = with_own_light(spread, x, self._setting.scene.needs.own, table)
-        return 2.0 * problem.equations(x).cost, certainties(standard_deviations(spread, table), table, spread), spread
+        return certainties(standard_deviations(spread, table), table, spread), spread
+
+    def cost(self, x: Vector) -> float:
+        """The mean square residual."""
+        return 2.0 * self._problem.equations(x).cost
+
+    def _covariance(self, x: Vector) -> NDArray[np.float64]:
+        coarser = None if self._problem.coarser is None else self._rows_of(self._problem.coarser, x)
+        return covariance(*self.rows(x), self._setting.table, self.model_error, coarser=coarser)
 
     @property
     def model_error(self) -> float:
