@@ -10,7 +10,7 @@ recording's own noise.
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass
 from statistics import NormalDist
 
@@ -80,12 +80,17 @@ def compare(problem: Problem, first: Vector, other: Vector, model_error: float =
     return Comparison(more, deviation, distance, more - float(np.maximum(loudest, 0.0).sum()))
 
 
-def rival_notes(rivals: Sequence[Rival], x: NDArray[np.float64], table: ParameterTable) -> tuple[str, ...]:
-    """A sentence for each likely rival of `x`, likeliest first, with the values that differ most."""
+def rival_notes(
+    rivals: Sequence[Rival], x: NDArray[np.float64], table: ParameterTable, unseen: Collection[str] = ()
+) -> tuple[str, ...]:
+    """A sentence for each likely rival of `x`, likeliest first, with the values that differ most.
+
+    Of values that the picture does not show it is said already that they may be any other.
+    """
     notes = []
     for rival in sorted(rivals, key=lambda rival: -rival.share):
         away = table.away(rival.x, x)
-        names = [name for name in table.names if _matters(name, x, rival.x, table)]
+        names = [name for name in table.names if name not in unseen and _matters(name, x, rival.x, table)]
         change = {name: float(away[table.slice_of(name)].max()) for name in names}
         told = [name for name in sorted(change, key=lambda n: -change[n]) if change[name] > TELLING][:MOST_TOLD]
         if rival.share < TOLD_FROM or not told:

@@ -78,7 +78,7 @@ def keep_values(end: OnRecording, seen: Callable[[Pixels], float] | None = None)
                 found, off = kept, held
                 notes.append(kept_note(back, table))
                 break
-    notes += rival_notes(refined.rivals, found, table)
+    notes += rival_notes(refined.rivals, found, table, unseen)
     return Kept(found, tuple(off), certainty, spread, tuple(notes))
 
 

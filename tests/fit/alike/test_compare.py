@@ -120,6 +120,14 @@ def test_values_that_differ_are_told_the_most_different_first():
     )  # without a coat its roughness says nothing
 
 
+def test_values_that_no_picture_shows_are_not_told():
+    """Of a tint and a level that trade it was said that with 51 % they are others."""
+    other = rival(0.31, coat_weight=0.48, roughness=0.45)
+    (note,) = rival_notes((other,), FOUND, TABLE, ["coat_weight"])
+    assert note == "With a probability of 31 % it is another material: roughness 0.45 (not 0.3)."
+    assert rival_notes((other,), FOUND, TABLE, ["coat_weight", "roughness"]) == ()
+
+
 def test_the_last_of_many_that_look_alike_has_no_probability_of_its_own():
     last = Rival(TABLE.pack({**TABLE.unpack(FOUND), "roughness": 0.9}), 1.0 / 3.0, last=True)
     assert rival_notes((last,), FOUND, TABLE) == (
