@@ -73,7 +73,7 @@ def prepare_several_blender_principled(
             start = {} if table is None else table.unpack(opened[bsdf_id][2])
             _put_material(scene, bsdf, materials[bsdf_id], start, textures)
     _put_normal_maps(scene, materials)
-    return [_prepared(scene, *found, materials[bsdf_id], textures) for bsdf_id, found in opened.items()]
+    return [_prepared(*found, materials[bsdf_id]) for bsdf_id, found in opened.items()]
 
 
 def _put_normal_maps(scene: Element, materials: Materials) -> None:
@@ -130,7 +130,7 @@ def _near_walks(
         if p.name == DENSITY and values.get(DENSITY):
             p = replace(p, upper=float(np.ravel(values[DENSITY])[0]) * WALKS_NEAR)
         if p.name in strengths:
-            p = replace(p, upper=(float(np.ravel(values.get(STRENGTH, 0.0))[0]) or 1.0) * WALKS_NEAR)
+            p = replace(p, upper=(float(np.ravel(values.get(p.name, 0.0))[0]) or 1.0) * WALKS_NEAR)
         if p.name in sizes:
             present = np.maximum(np.ravel(values.get(p.name, p.default)), LEAST_SIZE)
             begin = tuple(float(v) for v in present) if p.size == 3 else float(present[0])
@@ -178,12 +178,7 @@ def _put_material(
 
 
 def _prepared(
-    scene: Element,
-    target: Target,
-    table: ParameterTable,
-    start: NDArray[np.float64],
-    material: Mapping[str, Any],
-    textures: Mapping[str, Element],
+    target: Target, table: ParameterTable, start: NDArray[np.float64], material: Mapping[str, Any]
 ) -> PreparedMaterial:
     """What the renderer is told of a target whose BSDF has been put."""
     outer, mix = target.outer, mix_values(material)

@@ -61,6 +61,18 @@ def test_starts_at_the_sockets_and_follows_finite_differences(tmp_path: Path) ->
         np.testing.assert_allclose(gradient[i], np.sum((high - low) * weight) / 2e-2, rtol=5e-3)
 
 
+def test_the_strength_of_a_shader_in_a_mix_may_be_five_times_that_of_the_scene(tmp_path: Path) -> None:
+    """A neon of strength 20 began at 5, which was the most it could be."""
+    sockets = {"Emission Color": {"value": [1.0, 0.2, 0.1]}, "Emission Strength": {"value": 20.0}}
+    free = {"Emission Strength": "Neon/Strength"}
+    neon = {"name": "Neon", "shader": "emission", "sockets": sockets, "weight": {"value": 0.5}, "free": free}
+    mixed = {"name": "Paint", "sockets": SOCKETS, "weight": {"value": 0.5}, "leaves": [neon]}
+    renderer = load(tmp_path, ("roughness",), {"glaze": mixed})
+    values = renderer.table.unpack(renderer.start)
+    assert values["Neon/Strength"] == 20.0
+    assert renderer.table["Neon/Strength"].upper == 100.0
+
+
 def test_the_whole_set_leaves_out_linked_and_invisible_parameters(tmp_path: Path) -> None:
     names = load(tmp_path, "all").table.names
     assert {"base_color", "roughness", "coat_weight", "sheen_weight", "specular_ior_level"} <= set(names)
