@@ -23,6 +23,7 @@ from ..export.nodes.displacement import bends_normals, unbent
 from ..export.nodes.leaf_kinds import EMISSION, distribution_of, is_shader, kind_of, only_nearest, walks_of
 from ..export.nodes.read_alphas import keep_alphas
 from ..probe.closure_tree import ClosureTree, Leaf, Value, own_groups
+from ..probe.graph_copy import nodes_of
 from ..probe.light_path import (
     ANSWERS,
     BEHIND,
@@ -88,7 +89,8 @@ def baked_surface(
             groups += answer_backfacing(tree)
         view, around = asked_for(tree, OF_VIEW), asked_for(tree, OF_SURROUNDINGS)
         emits = _emits(tree)
-        with surface_stage(scene, instance, depsgraph, slot, material, size) as stage:
+        bends = bends_normals(material) or any(_is_bumped(node) for node in nodes_of(tree))
+        with surface_stage(scene, instance, depsgraph, slot, material, size, for_normals=bends) as stage:
             baked = _Bake(stage, material, folder, size, of_view=bool(view), of_back=rays == BEHIND)
             answer: dict[str, Any] = {"view": view, "paths": sorted(paths), "around": around}
             answer["place"], answer["sides"] = place, sides
@@ -143,16 +145,21 @@ def _leaves(closures: ClosureTree, baked: _Bake) -> list[dict[str, Any]]:
     return leaves
 
 
+def _is_bumped(shader: bpy.types.Node) -> bool:
+    """Whether nodes give a shader its normal."""
+    socket = shader.inputs.get("Normal")
+    return socket is not None and socket.is_linked
+
+
 def _is_flat(local: Pixels) -> bool:
     """Whether the normals of a map bend nothing."""
     return np.abs(local[..., :2]).max() <= FLAT
 
 
 def _normal(closures: ClosureTree, leaf: Leaf) -> Value | None:
-    socket = leaf.node.inputs.get("Normal")
-    if socket is None or not socket.is_linked:
+    if not _is_bumped(leaf.node):
         return None
-    value = closures.value(leaf.path, socket)
+    value = closures.value(leaf.path, leaf.node.inputs["Normal"])
     return value if hasattr(value, "is_output") else None
 
 

@@ -49,11 +49,16 @@ def surface_stage(
     slot: int,
     material: bpy.types.Material,
     size: int,
+    *,
+    for_normals: bool,
 ) -> Iterator[SurfaceStage]:
-    """The object of an instance alone, with a UV map for the faces in `slot`, which have `material`."""
+    """The object of an instance alone, with a UV map for the faces in `slot`, which have `material`.
+
+    What is `for_normals` has the frames of faces that a displacement has moved, which take Cycles a bake to know.
+    """
     last = max(slot_count(instance.object) - 1, 0)
     slots = [material_of_slot(instance.object, number) for number in range(last + 1)]
-    is_moved = any(shown is not None and moves_faces(shown.original) for shown in slots)
+    is_moved = for_normals and any(shown is not None and moves_faces(shown.original) for shown in slots)
     moved = moved_corners(scene, instance, depsgraph)[0] if is_moved else None
     blank = bpy.data.materials.new("material_fit_blank")
     try:

@@ -16,7 +16,7 @@ from ..export.nodes.leaf_kinds import (
     TRANSPARENT,
     UNUSED_SOCKETS,
     inputs_of,
-    is_fitted,
+    is_fitted_in_mix,
     kind_of,
     shines,
 )
@@ -128,7 +128,7 @@ def mix_values(target: TargetShader) -> list[MixValue]:
         place = Place((*(group.name for group in factor.groups), node.name), INPUT, factor.socket.identifier)
         found.append(_value(node, factor.socket.name, place, not _is_in_colors(target, factor), factor=factor))
     for number, leaf in enumerate(target.others):
-        if not (is_fitted(leaf.node) or leaf.node.bl_idname == EMISSION):
+        if not is_fitted_in_mix(leaf.node):
             continue
         shader = TargetShader(leaf)
         default, held = _default_names(shader), {*NOT_FITTED, *without_glow(shader)}
@@ -200,7 +200,7 @@ def _is_in_colors(target: TargetShader, factor: Factor) -> bool:
 
 
 def _has_free_color(leaf: ClosureLeaf) -> bool:
-    if not (is_fitted(leaf.node) or leaf.node.bl_idname == EMISSION):
+    if not is_fitted_in_mix(leaf.node):
         return False
     names = ("Base Color", "Sheen Tint", "Emission Color")
     return any(not socket.is_linked for name, socket in inputs_of(leaf.node).items() if name in names)

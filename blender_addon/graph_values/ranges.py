@@ -63,7 +63,7 @@ AMOUNTS = {
 OF_SUMS, OF_PRODUCTS = ("ADD", "SUBTRACT", "MULTIPLY_ADD"), ("MULTIPLY", "DIVIDE")
 # Nodes whose own numbers are dials. Those of Math are none: a picture with a factor stays one, and 1 - x an inverse
 DIALS = ("ShaderNodeGroup", "ShaderNodeValue", "ShaderNodeMapRange", "ShaderNodeMix")
-# A glow may be so many times as strong as it is, as by its own socket: nothing says that 1 is the most
+# A glow may be so many times as strong as it is, as by its own socket: nothing says that 1 is the most. No measurement
 STRONGER = 5.0
 LEFT_OUT = (("ShaderNodeBump", "Filter Width"),)  # how nodes are sampled, and not what they show
 DIRECTION = ("ShaderNodeNormalMap", "Color")  # an input whose colour is a direction

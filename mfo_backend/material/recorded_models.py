@@ -217,12 +217,10 @@ class MixedModel(BlenderPrincipledModel):
                 if not leaf.only_glows:
                     lit.append(evaluate(layers, layers.to_frame(own_wo)) * amount)
             value = sum(lit[1:], lit[0])
-            if below is None and not glow:
-                return value
-            inside = sum(glow[1:], glow[0]) if glow else 0 * value
-            if below is not None:
+            inside = sum(glow[1:], glow[0]) if glow else below
+            if glow and below is not None:
                 inside = dr.select(parameters["walk_length"] > 0, below, inside)
-            return dr.select(dr.dot(wo, wo) > 0, value, inside)
+            return value if inside is None else dr.select(dr.dot(wo, wo) > 0, value, inside)
 
         return seen
 

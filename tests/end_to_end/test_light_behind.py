@@ -3,7 +3,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -123,17 +125,23 @@ found = [list(element.color)[:3] for element in nodes["Color Ramp"].color_ramp.e
 """
 
 
-def test_what_a_ramp_gives_both_shaders_of_a_leaf_is_found(tmp_path: Path) -> None:
-    start, picture, saved = tmp_path / "start.blend", tmp_path / "leaf.exr", tmp_path / "saved.blend"
-    run_bpy(LEAF, start, picture)
-    names = "Roughness, Color Ramp/Stop 0, Color Ramp/Stop 1, Mix Shader/Factor"
+def saved_same(folder: Path, scene: Sequence[Any], *options: str) -> Path:
+    """The file that a fit of a scene's script, with what follows it, has saved, and that is the same."""
+    build, *more = scene
+    start, picture, saved = folder / "start.blend", folder / "reference.exr", folder / "saved.blend"
+    run_bpy(build, start, picture, *more)
     done = run_mfo(
-        "blend", start, "--object", "Sheet", "--reference", picture, "--parameters", names,
-        "--out", tmp_path / "job", "--apply", "--save-as", saved, "--json",
+        "blend", start, "--object", "Sheet", "--reference", picture, *options,
+        "--out", folder / "job", "--apply", "--save-as", saved, "--json",
     )  # fmt: skip
     assert done.code == 0, done.stderr
     assert done.answer["verdict"] == "same"
-    low, high, factor = run_bpy(SHOW, saved)
+    return saved
+
+
+def test_what_a_ramp_gives_both_shaders_of_a_leaf_is_found(tmp_path: Path) -> None:
+    names = "Roughness, Color Ramp/Stop 0, Color Ramp/Stop 1, Mix Shader/Factor"
+    low, high, factor = run_bpy(SHOW, saved_same(tmp_path, [LEAF], "--parameters", names))
     assert low == pytest.approx([0.05, 0.3, 0.04], abs=0.03)
     assert high == pytest.approx([0.5, 0.45, 0.1], abs=0.05)
     assert factor == pytest.approx(0.6, abs=0.05)
@@ -142,15 +150,7 @@ def test_what_a_ramp_gives_both_shaders_of_a_leaf_is_found(tmp_path: Path) -> No
 @pytest.mark.parametrize("strength", [1.0, 0.0])
 def test_the_strength_of_a_glow_by_a_picture_is_found(tmp_path: Path, strength: float) -> None:
     """From none by the class of materials that glow."""
-    start, picture, saved = tmp_path / "start.blend", tmp_path / "sign.exr", tmp_path / "saved.blend"
-    run_bpy(SIGN, start, picture, strength)
-    done = run_mfo(
-        "blend", start, "--object", "Sheet", "--reference", picture,
-        "--out", tmp_path / "job", "--apply", "--save-as", saved, "--json",
-    )  # fmt: skip
-    assert done.code == 0, done.stderr
-    assert done.answer["verdict"] == "same"
-    assert run_bpy(SHOW, saved) == pytest.approx(2.5, rel=0.02)
+    assert run_bpy(SHOW, saved_same(tmp_path, [SIGN, strength])) == pytest.approx(2.5, rel=0.02)
 
 
 @pytest.mark.parametrize(
@@ -162,13 +162,6 @@ def test_the_light_that_nodes_give_is_found(
     tmp_path: Path, build: str, radiances: list[tuple[float, float, float]]
 ) -> None:
     """Colour and strength are a product."""
-    start, picture, saved = tmp_path / "start.blend", tmp_path / "glow.exr", tmp_path / "saved.blend"
-    run_bpy(build, start, picture)
-    done = run_mfo(
-        "blend", start, "--object", "Sheet", "--reference", picture,
-        "--out", tmp_path / "job", "--apply", "--save-as", saved, "--json",
-    )  # fmt: skip
-    assert done.code == 0, done.stderr
-    assert done.answer["verdict"] == "same"
+    saved = saved_same(tmp_path, [build])
     for found, radiance in zip(run_bpy(SHOW_GLOW, saved), radiances, strict=True):
         assert found == pytest.approx(radiance, abs=0.03)

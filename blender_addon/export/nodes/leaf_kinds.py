@@ -134,8 +134,13 @@ def shines(node: bpy.types.Node) -> bool:
 
 
 def is_fitted(node: bpy.types.Node) -> bool:
-    """Whether the values of a node can be fitted by themselves: it reflects light, and its model is exact."""
-    return node.bl_idname != EMISSION and kind_of(node) is not None and why_not_fitted(node) is None
+    """Whether the values of a node can be fitted by themselves: they are fitted in a mix, and it reflects light."""
+    return node.bl_idname != EMISSION and is_fitted_in_mix(node)
+
+
+def is_fitted_in_mix(node: bpy.types.Node) -> bool:
+    """Whether the values of a node can be fitted beside those of another one: its model is exact."""
+    return kind_of(node) is not None and why_not_fitted(node) is None
 
 
 def is_numbered(node: bpy.types.Node) -> bool:

@@ -162,7 +162,8 @@ def target_shader(material: bpy.types.Material | None, leaf: str | None = None) 
 
 def chosen_leaf(material: bpy.types.Material | None) -> str:
     """The name of the leaf that the user chose for a material, empty where it is left to the shares."""
-    return "" if fits_all_leaves(material) else _kept_leaf(material)
+    kept = _kept_leaf(material)
+    return "" if kept == ALL_LEAVES else kept
 
 
 def fits_all_leaves(material: bpy.types.Material | None) -> bool:

@@ -14,11 +14,11 @@ from numpy.typing import NDArray
 from ..camera.camera_model import Camera
 from ..findings import Findings, Fix
 from ..fitted_slot import FittedSlot
+from ..lights.shadowless_lamps import note_hidden_lamps
 from ..meshes.mesh_arrays import Piece
 from ..nodes.clear_objects import bends_light, nodes_of, passes_light
 from ..render_state import instanced_objects, rendered_objects
 from .scene_data import SceneData
-from .shadowless_lamps import note_hidden_lamps
 
 # rays towards as many points of the target are tried before it counts as hidden
 PROBES = 2000
@@ -54,7 +54,7 @@ def look_at_targets(
     for number, (each, own) in enumerate(zip(fitted, pieces, strict=True)):
         of_one = Findings()
         seen, data.behind[number] = check_visible(data, own, each.object, each.slot, scene, depsgraph, of_one)
-        note_hidden_lamps(each.object, seen, data, scene, depsgraph, findings)
+        note_hidden_lamps(each.object, seen, data.lights, data.origin, scene, depsgraph, findings)
         if of_one.errors:
             data.unseen[number] = of_one.errors[0]
             if not may_miss:

@@ -62,8 +62,8 @@ def keep_values(end: OnRecording, seen: Callable[[Pixels], float] | None = None)
         allowed = cost + SIGNIFICANT * len(moved) * max(cost, judged.model_error**2) / problem.independent
         simpler = _solve_holding(setting, refined, found, off)
         simpler = None if simpler is None else with_user_details(simpler, user, table)
-        if simpler is not None and judged.cost(simpler) <= allowed + 1e-12 and unseen_change(simpler):
-            found, cost = simpler, judged.cost(simpler)
+        if simpler is not None and (again := judged.cost(simpler)) <= allowed + 1e-12 and unseen_change(simpler):
+            found, cost = simpler, again
         else:
             off = [name for name in off if name not in moved]
 

@@ -114,12 +114,11 @@ def held_notes(request: Request, result: FitResult) -> tuple[str, ...]:
         return ()
     leaves = ", ".join(leaf.name for leaf in material.leaves if not (leaf.free or leaf.varies))
     notes = [_LEAVES_HELD.format(names=leaves)] if leaves else []
-    color, strength = (
-        material.sockets.get(SOCKET_OF_PARAMETER[name]) for name in ("emission_color", "emission_strength")
-    )
+    names = [SOCKET_OF_PARAMETER[name] for name in ("emission_color", "emission_strength")]
+    color, strength = map(material.sockets.get, names)
     values = () if request.graph is None else request.graph.values
     fitted = {name for value in values if value.name in result.recovered for name in value.sockets}
-    is_fitted = "emission_strength" in result.recovered or fitted & {"Emission Color", "Emission Strength"}
+    is_fitted = "emission_strength" in result.recovered or not fitted.isdisjoint(names)
     if color is not None and strength is not None and not is_fitted:
         glows = strength.linked or (color.linked and strength.value != 0.0)
         notes += [_GLOW_HELD] if glows else []
