@@ -122,16 +122,6 @@ def with_rivals(spread: Vector, x: Vector, rivals: Sequence[Rival], width: Vecto
     return spread
 
 
-def with_own_light(spread: Vector, x: Vector, share: float, table: ParameterTable) -> Vector:
-    """A covariance (k, k) in widths of the box, where a `share` of the light hangs on values that lanes hold as known.
-
-    Colours scale with it. A lampshade's was off by 0.03 and called determined (docs/notebook/graph_values.md).
-    """
-    colors = np.array([p.size == 3 for p in table for _ in range(p.size)])
-    away = np.where(colors, BOX_SD * share * x / table.width, 0.0)
-    return spread + np.outer(away, away)
-
-
 def standard_deviations(spread: Vector, table: ParameterTable) -> Vector:
     """Standard deviation (k,) of each value, in its own unit, from a `covariance`."""
     return table.width * np.sqrt(np.maximum(np.diag(spread), 0.0))

@@ -18,7 +18,7 @@ from ...types.parameter import ParameterTable
 from ..alike.compare import rival_notes
 from ..alike.hidden_coat import largest_covariance
 from ..alike.unneeded_lobes import box_holding, dispensable, moved_to_user, unneeded_lobes, with_user_details
-from ..certainty.covariance import certainties, covariance, standard_deviations, with_own_light, with_rivals
+from ..certainty.covariance import certainties, covariance, standard_deviations, with_rivals
 from ..result.outcome import kept_note
 from ..squares.problem import Problem, Refined
 from ..squares.recording_noise import rows_of_samples
@@ -116,7 +116,6 @@ class Judged:
         table = self._setting.table
         spread = largest_covariance(self._covariance, x, table)
         spread = with_rivals(spread, x, self._rivals, table.width)
-        spread = with_own_light(spread, x, self._setting.scene.needs.own, table)
         return certainties(standard_deviations(spread, table), table, spread), spread
 
     def cost(self, x: Vector) -> float:

@@ -23,19 +23,14 @@ from .start import Started
 from .where_to_look import all_groups, fewer_groups, finer_grid, solution_grid
 
 EVALUATIONS_EXACT = 15
-# At the solution, until it holds still. With 3 the walls of `OWN_LIGHT` ended 0.019 FLIP above the floor, and end 0.008
-# above it, in the same processor time; fits of 8 scenes whose light moves less make as many as before.
-MOST_RECORDINGS = 5
+MOST_RECORDINGS = 5  # at the solution, until it holds still
 # After a solve its recording is too old if the tiles changed by this share, or if its own noise grew by this factor.
 # The first is what mends fits that began far away, though most of those keep their samples; the second finds a lobe
 # that became narrow in few tiles.
 MOVED = 0.15
 NOISIER = 1.25
-# The same where a part of the light comes over other surfaces, and may come from the target itself: that part is still
-# what the material gave which the recording was made for. Light walls of a room, 4.1 % off and called determined
-# without it, are 0.9 % off; with twice as much 1.1 % (docs/notebook/several_materials.md). Smaller: recordings that
-# follow noise.
-OWN_LIGHT = 0.01
+# The same where this part of all light comes back to the target changed, which a recording follows by an albedo alone
+RETURNED = 0.005
 
 
 @dataclass(frozen=True, eq=False)
@@ -109,8 +104,7 @@ def _recorded_near(setting: Setting, stage: Stage, start: Vector, number: int) -
 
     `number` is how many recordings there were before.
     """
-    plan, last = setting.plan, number + MOST_RECORDINGS
-    grid, step = plan.grid_last, None
+    plan, last, grid = setting.plan, number + MOST_RECORDINGS, setting.plan.grid_last
     finest = partial(setting.scene.finest_grid, SAMPLES)
     while True:
         number += 1
@@ -120,40 +114,19 @@ def _recorded_near(setting: Setting, stage: Stage, start: Vector, number: int) -
         few = _problems(recording, start).refined.few
         x = solve(setting, few, start, NEAR_EVALUATIONS, stage=stage).x
         before, after = few.own_noise(start), few.own_noise(x)
-        moved = _is_old(few.change(start, x), setting.scene.needs.indirect) or after > NOISIER * before
+        old = _is_old(recording, few.change(start, x), x) or after > NOISIER * before
         finer = finer_grid(grid, after, few.own_share(x), plan, finest)
-        if not (moved or finer > grid) or number == last or setting.course.should_stop():
+        if not (old or finer > grid) or number == last or setting.course.should_stop():
             return recording, x, grid
         del few, recording
-        step = _Step.after(step if setting.scene.needs.own else None, (x - start) / setting.table.width)
-        start, grid = start + step.share * (x - start), finer
+        start, grid = x, finer
 
 
-@dataclass(frozen=True, eq=False)
-class _Step:
-    """How far a solve has gone from the material of its recording, in widths of the bounds, and the share of that which
-    the next recording goes.
-
-    Light that the target gives itself makes too dark a material of too bright a one, and again. The share is Aitken's
-    for vectors (Irons and Tuck, "A version of the Aitken accelerator for computer iteration", 1969), at most the whole.
-    """
-
-    away: Vector
-    share: float
-
-    @staticmethod
-    def after(last: _Step | None, away: Vector) -> _Step:
-        """The step after another one."""
-        if last is None:
-            return _Step(away, 1.0)
-        turn = away - last.away
-        back = -last.share * float(np.dot(last.away, turn))  # not above 0 where the way goes on
-        return _Step(away, min(back / float(np.dot(turn, turn)), 1.0) if back > 0.0 else 1.0)
-
-
-def _is_old(change: float, indirect: float) -> bool:
-    """Whether tiles that changed by a share ask for a new recording, given the light over other surfaces."""
-    return change > MOVED or change * indirect / (1.0 + indirect) > OWN_LIGHT
+def _is_old(recording: Recording, change: float, x: Vector) -> bool:
+    """Whether `x`, by which tiles have changed by a share, asks for a new recording."""
+    scene = recording.setting.scene
+    returned = max(change * scene.needs.held, scene.returned_change(recording.paths, x))
+    return change > MOVED or returned > RETURNED
 
 
 def _problems(recording: Recording, x: Vector, *, solve_all: bool = False) -> OnRecording:

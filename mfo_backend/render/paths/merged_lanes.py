@@ -18,14 +18,15 @@ from numpy.typing import NDArray
 
 from ...material.arrays.own_memory import own_memory
 from ..camera.primary_rays import PrimaryRays
-from .recorded_paths import RecordedPaths
+from .recorded_paths import RecordedPaths, ReturnedLight
 
 
 @dataclass
 class TechniqueLanes:
     """One technique's lanes before they are merged; positions of sample s follow s times the pixels.
 
-    `others` is radiance of the held materials of a mix; what shows these alone has no `weight`.
+    `others` is radiance of the held materials of a mix; what shows these alone has no `weight`. `returned` is the part
+    of the weight that the target has reflected before, and that part times how often.
     """
 
     wi: mi.Vector3f
@@ -34,6 +35,7 @@ class TechniqueLanes:
     position: mi.UInt32
     held: tuple[Any, ...]
     others: Any = None
+    returned: tuple[mi.Color3f, mi.Color3f] | None = None
 
 
 def _radiance_of_held(
@@ -84,20 +86,41 @@ def merged_lanes(
     rank[np.argsort(position, kind="stable")] = np.arange(len(position), dtype=np.uint32)
     wi, wo, weight = (dr.zeros(kind, len(position)) for kind in (mi.Vector3f, mi.Vector3f, mi.Color3f))
     held = [dr.zeros(type(value), len(position)) for value in lanes[0].held] if lanes else []
-    begin = 0
+    returned = dr.zeros(mi.Color3f, len(position)) if any(part.returned is not None for part in lanes) else None
+    begin, reflected = 0, np.zeros((2, 3))
     for part in lanes:
         end = begin + dr.width(part.position)
         if end > begin:
             target = own_memory(rank[begin:end], mi.UInt32)
-            pairs = ((wi, part.wi), (wo, part.wo), (weight, part.weight), *zip(held, part.held, strict=True))
+            pairs = [(wi, part.wi), (wo, part.wo), (weight, part.weight), *zip(held, part.held, strict=True)]
+            if part.returned is not None:
+                pairs.append((returned, part.returned[0]))
+                reflected += [summed(a) for a in part.returned]
             for merged, value in pairs:
                 dr.scatter(merged, value, target, mode=dr.ReduceMode.Permute)
         begin = end
-    dr.eval(wi, wo, weight, held)
+    dr.eval(wi, wo, weight, held, returned)
     pixels = len(rays.pixel)
     count = np.bincount(position, minlength=samples * pixels).reshape(samples, pixels)[:, covered]
     first = np.concatenate([np.zeros((samples, 1), int), np.cumsum(count, axis=1)], axis=1)
     first[1:] += np.cumsum(first[:-1, -1])[:, None]
     values = dict(zip(named, held, strict=False))
     pixel, tile = rays.pixel[covered], rays.tile[covered]
-    return RecordedPaths(wi, wo, weight, pixel, tile, first, coverage, constant, values, constant_difference=difference)
+    light = None if returned is None else _returned_light(returned, *reflected, weight)
+    return RecordedPaths(
+        wi, wo, weight, pixel, tile, first, coverage, constant, values,
+        constant_difference=difference, returned=light,
+    )  # fmt: skip
+
+
+def _returned_light(
+    returned: mi.Color3f, once: NDArray[np.float64], counted: NDArray[np.float64], weight: mi.Color3f
+) -> ReturnedLight:
+    """Light that the target has reflected before, whose sum and sum times how often are given."""
+    order = np.where(once > 0.0, counted / np.maximum(once, 1e-30), 1.0)
+    return ReturnedLight(returned, order, once / np.maximum(summed(weight), 1e-30))
+
+
+def summed(lanes: mi.Color3f) -> NDArray[np.float64]:
+    """Sum over lanes, (3,)."""
+    return np.array([dr.sum(channel)[0] for channel in lanes], np.float64)

@@ -26,7 +26,7 @@ READ_BEFORE = 1  # times that lanes are read as they were recorded: packing take
 class Lanes:
     """Lanes, and which of them each lane of a kernel reads: `start`, then `step` further, before `stop`.
 
-    `arrays` are directions to camera and light, weights, and values that textures give.
+    `arrays` are directions to camera and light, weights, values that textures give, and light that returns.
     """
 
     arrays: tuple[Any, ...]
@@ -39,7 +39,8 @@ class Lanes:
         """Those of `groups` where they are in the recording, with the values `held` by name."""
         start, stop, _ = groups.parts
         arrays = (paths.wi, paths.wo, paths.weight, *(paths.held[name] for name in held))
-        return Lanes(arrays, start, stop, dr.opaque(mi.UInt32, 1))
+        returned = () if paths.returned is None else (paths.returned.weight,)
+        return Lanes((*arrays, *returned), start, stop, dr.opaque(mi.UInt32, 1))
 
 
 class LaneReader:

@@ -8,7 +8,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import Any
 
 import drjit as dr
@@ -23,52 +23,18 @@ from ..camera.first_hits import first_hits
 from ..camera.highlight_cells import highlight_cells
 from ..camera.pixel_cells import PixelCells
 from ..camera.primary_rays import TILE, PrimaryRays, fresh_sampler, tile_order
+from ..camera.target_hits import TargetHits, facing, other_normals, turned, without_parametrisation
 from ..lamps.met_lamps import DELTA, SceneLamps, lights_have_no_extent
 from ..random_numbers.even_points import even_points
 from ..transport.ray_starts import RayStarts
 from ..transport.shadow_rays import ShadowRays
-from ..transport.smooth_facets import leaves_on, met_light, seen_side
-from ..transport.traced_radiance import sent_on, tells_rays
+from ..transport.smooth_facets import leaves_on, met_light
+from ..transport.traced_radiance import SentOn, sent_on, tells_rays
 from .merged_lanes import TechniqueLanes, coverage_of, merged_lanes
 from .record_settings import RecordSettings
 from .recorded_background import add_radiance, recorded_background
 from .recorded_paths import RecordedPaths
 from .walked_lanes import WalkSettings, walked_lanes
-
-
-@dataclass
-class _Hits:
-    """First hits of the camera rays on the target, and the number of `pixels`.
-
-    Of a mix there is the `plugin`, and `own` are the hits in the frame of the mesh, which its held materials take.
-    Of a material whose lobes have normals of their own `diffuse` is that of diffuse ones; `coat` is that of a coat of
-    its own, and `smooth` the mesh's, of a mix. Light comes `through` some.
-    """
-
-    si: Any
-    position: mi.UInt32
-    share: mi.Float
-    held: tuple[Any, ...]
-    pixels: int
-    plugin: Any = None
-    own: Any = None
-    coat: Any = None
-    smooth: Any = None
-    diffuse: Any = None
-    through: bool = False
-
-    def lit(self, wo: mi.Vector3f) -> mi.Bool:
-        """Whether light from `wo` reaches the material: below the plane of its microfacets may lie what others see."""
-        if self.through:
-            return wo.z != 0.0
-        lit = wo.z > 0.0 if self.smooth is None else dr.dot(self.smooth, wo) > 0.0
-        return lit if self.diffuse is None else lit | (dr.dot(self.diffuse, wo) > 0.0)
-
-    def of_rays(self, ray: mi.UInt32) -> _Hits:
-        """Those of some rays, which may repeat."""
-        names = ("si", "position", "share", "own", "coat", "smooth", "diffuse")
-        some = {name: dr.gather(type(a), a, ray) for name in names if (a := getattr(self, name)) is not None}
-        return replace(self, **some, held=tuple(dr.gather(type(a), a, ray) for a in self.held))
 
 
 def record_paths(
@@ -105,7 +71,7 @@ def record_paths(
         if lamps.seen:
             before = lamps.met(ray, si, mi.Bool(True), camera=True) * filter_weight
             glow = before if glow is None else glow + before
-        si = _facing(scene, shape, settings, si)
+        si = facing(scene, shape, si, two_sided=settings.two_sided)
         held = ()
         if settings.held:
             plugin: Any = shape.bsdf()
@@ -123,15 +89,17 @@ def record_paths(
         own = mi.SurfaceInteraction3f(si) if settings.mixed else None
         if own is not None and below is not None and not walks_free:
             own.duv_dx = mi.Point2f(0.0, 1.0)  # walks take the place of the lobe that stands for them
-        normals = _other_normals(shape, settings, si)
-        si = _turned(shape, settings, si)
+        normals = other_normals(
+            shape, si, bumped=settings.bumped, coat=settings.proposal.coat_roughness is not None, smooth=settings.mixed
+        )
+        si = turned(shape, si, bumped=settings.bumped)
         sampled = settings.depth > 2 or not lights_have_no_extent(scene)
         if settings.depth == 2 or settings.light_paths is None:
-            si = _without_parametrisation(si, own_normal=settings.bumped)
+            si = without_parametrisation(si, own_normal=settings.bumped)
         # exact lights alone look at hits once each, and compute them again instead of keeping them
         dr.eval(si if sampled or settings.mixed else (), own, *normals, position, filter_weight, share, held)
         plugin = shape.bsdf() if settings.mixed else None
-        hits = _Hits(si, position, share, held, len(rays.pixel), plugin, own, *normals, settings.proposal.through)
+        hits = TargetHits(si, position, share, held, len(rays.pixel), plugin, own, *normals, settings.proposal.through)
         exact = [part for part in _delta_lights(scene, hits, shadows) if dr.width(part.position) > 0]
         if radiance is not None:
             nowhere = dr.zeros(mi.Vector3f, dr.width(position))
@@ -174,63 +142,14 @@ def _camera_rays(scene: mi.Scene, shape: mi.Shape, settings: RecordSettings, wid
         ends = first_hits(scene, shape, rays, cut_out=settings.cut_out, seed=settings.seed)
         ray = rays.ray(dr.arange(mi.UInt32, len(rays)))
         si = ends.met.compute_surface_interaction(ray, mi.RayFlags.All, ends.on_target)
-        return _turned(shape, settings, _facing(scene, shape, settings, si)), ends.on_target
+        si = facing(scene, shape, si, two_sided=settings.two_sided)
+        return turned(shape, si, bumped=settings.bumped), ends.on_target
 
     cells = PixelCells.grid((per_axis + 1) // 2)
     return rays_in(highlight_cells(scene, cells, rays_in, hits_of, settings.highlights))
 
 
-def _without_parametrisation(si: mi.SurfaceInteraction3f, *, own_normal: bool) -> mi.SurfaceInteraction3f:
-    """Where hits are and how they are turned, perhaps with the mesh's normal: all that lights and proposals need."""
-    bare = dr.zeros(mi.SurfaceInteraction3f, dr.width(si))
-    bare.t, bare.time, bare.wavelengths = si.t, si.time, si.wavelengths
-    bare.p, bare.n, bare.sh_frame, bare.wi = si.p, si.n, si.sh_frame, si.wi
-    bare.shape, bare.prim_index = si.shape, si.prim_index
-    if own_normal:
-        bare.dn_du, bare.dn_dv = si.dn_du, si.dn_dv
-    return bare
-
-
-def _facing(
-    scene: mi.Scene, shape: mi.Shape, settings: RecordSettings, si: mi.SurfaceInteraction3f
-) -> mi.SurfaceInteraction3f:
-    if settings.two_sided:
-        return _face_camera(seen_side(scene, si))
-    return _face_camera(si) if shape.bsdf().class_name() == "TwoSidedBRDF" else si
-
-
-def _face_camera(si: mi.SurfaceInteraction3f) -> mi.SurfaceInteraction3f:
-    """Turn shading frames towards the camera, as the `twosided` plugin does: (x, y, z) -> (x, y, -z)."""
-    back = si.wi.z < 0.0
-    si.sh_frame.n = dr.select(back, -si.sh_frame.n, si.sh_frame.n)
-    si.wi.z = dr.abs(si.wi.z)
-    return si
-
-
-def _turned(shape: mi.Shape, settings: RecordSettings, si: mi.SurfaceInteraction3f) -> mi.SurfaceInteraction3f:
-    """Shading frames turned to the normals of a bumped material's microfacets: light is sampled about them."""
-    if not settings.bumped:
-        return si
-    plugin: Any = shape.bsdf()
-    frame, wi, _ = plugin.bumped_frame(si, mi.Bool(True))
-    si.sh_frame, si.wi = frame, wi
-    return si
-
-
-def _other_normals(
-    shape: mi.Shape, settings: RecordSettings, si: mi.SurfaceInteraction3f
-) -> tuple[mi.Vector3f | None, mi.Vector3f | None, mi.Vector3f | None]:
-    """The normal that the coat of a bumped material has of its own, the mesh's where it is mixed with others, and that
-    of its diffuse lobes, all in the frame of its microfacets."""
-    if not settings.bumped:
-        return None, None, None
-    plugin: Any = shape.bsdf()
-    normals = plugin.bumped_frame(si, mi.Bool(True))[2]
-    coat = normals["coat_normal"] if settings.proposal.coat_roughness is not None else None
-    return coat, normals["smooth_normal"] if settings.mixed else None, normals["bumped_normal"]
-
-
-def _delta_lights(scene: mi.Scene, hits: _Hits, shadows: ShadowRays) -> list[TechniqueLanes]:
+def _delta_lights(scene: mi.Scene, hits: TargetHits, shadows: ShadowRays) -> list[TechniqueLanes]:
     """One exact sample for each light of no extent."""
     si = hits.si
     started, terminator = [], shadows.terminator
@@ -248,7 +167,7 @@ def _delta_lights(scene: mi.Scene, hits: _Hits, shadows: ShadowRays) -> list[Tec
 def _sampled_lights(
     scene: mi.Scene,
     shape: mi.Shape,
-    hits: _Hits,
+    hits: TargetHits,
     settings: RecordSettings,
     lamps: SceneLamps,
     shadows: ShadowRays,
@@ -314,25 +233,27 @@ def _sampled_lights(
     weight = emission / (light_density + density)
     if lamps:
         weight += lamps.met(ray, far, valid, density=density, chance=choice) / density
+    reflected, counted = dr.zeros(mi.Color3f, dr.width(wo)), dr.zeros(mi.Color3f, dr.width(wo))
     if indirect:
         traced = met.is_valid() & (sample >= dr.opaque(mi.UInt32, settings.direct_samples))
-        dr.eval(traced, met, wo, weight, valid)
+        dr.eval(traced, met, wo, weight, reflected, counted, valid)
         index = dr.compress(traced)
         if dr.width(index) > 0:
             some = first.of_rays(index - index // rays * rays)
             met, towards = (dr.gather(type(a), a, index) for a in (met, wo))
-            total = dr.gather(mi.Color3f, weight, index) + _over_others(
-                scene, shape, shadows.starts, some, met, towards, settings
-            )
-            dr.scatter(weight, total, index, mode=dr.ReduceMode.Permute)
+            sent = _over_others(scene, shape, shadows.starts, some, met, towards, settings)
+            total = dr.gather(mi.Color3f, weight, index) + sent.radiance
+            for whole, found in ((weight, total), (reflected, sent.reflected), (counted, sent.counted)):
+                dr.scatter(whole, found, index, mode=dr.ReduceMode.Permute)
     # the share may be negative, where the pixel filter is
     share *= terminator.bend(si, wo, valid)
-    started.append(_lit(hits, wo, weight * share, valid & (dr.max(weight) > 0.0)))
+    returned = (reflected * share, counted * share) if indirect else None
+    started.append(_lit(hits, wo, weight * share, valid & (dr.max(weight) > 0.0), returned))
     return [kept() for kept in started]
 
 
 def _walks(
-    scene: mi.Scene, hits: _Hits, held: tuple[Any, ...], below: Below, settings: RecordSettings, *, free: bool
+    scene: mi.Scene, hits: TargetHits, held: tuple[Any, ...], below: Below, settings: RecordSettings, *, free: bool
 ) -> TechniqueLanes:
     """Walks below the surface from all hits, lanes where they are `free`: their light hangs on values that change.
 
@@ -351,28 +272,31 @@ def _over_others(
     scene: mi.Scene,
     shape: mi.Shape,
     starts: RayStarts,
-    hits: _Hits,
+    hits: TargetHits,
     met: mi.PreliminaryIntersection3f,
     wo: mi.Vector3f,
     settings: RecordSettings,
-) -> mi.Color3f:
-    """Radiance over the surfaces that rays from the target have `met`, but their own emission, by the rays' density.
+) -> SentOn:
+    """Light over the surfaces that rays from the target have `met`, but their own emission, by the rays' density.
 
     Few rays of most scenes meet something: they are traced on from there side by side.
     """
     si, sampler = hits.si, fresh_sampler(settings.seed + 0x51ED270, dr.width(wo))
     ray = starts.ray(si, si.to_world(wo))
     depth = settings.depth - 1
-    radiance = sent_on(scene, shape.bsdf(), sampler, ray, settings.light_paths, depth, si=si, wo=wo, met=met)
-    return radiance / settings.proposal.density(si.wi, wo, hits.coat, hits.diffuse)
+    by_chance = fresh_sampler(settings.seed + 0x2C1B3C6D, dr.width(wo)).next_1d()
+    sent = sent_on(scene, shape, sampler, ray, settings.light_paths, depth, si=si, wo=wo, met=met, by_chance=by_chance)
+    return sent * (1.0 / settings.proposal.density(si.wi, wo, hits.coat, hits.diffuse))
 
 
-def _lit(hits: _Hits, wo: mi.Vector3f, weight: mi.Color3f, keep: mi.Bool) -> Callable[[], TechniqueLanes]:
+def _lit(
+    hits: TargetHits, wo: mi.Vector3f, weight: mi.Color3f, keep: mi.Bool, returned: tuple[mi.Color3f, ...] | None = None
+) -> Callable[[], TechniqueLanes]:
     """Start to compute lanes; returns what waits for those to keep, while the next technique is traced in Python."""
     weight = mi.Color3f(weight)
     keep = keep & dr.all(dr.isfinite(weight))
     wi = hits.si.wi
-    dr.eval(wi, wo, weight, keep)
+    dr.eval(wi, wo, weight, keep, returned)
 
     def kept() -> TechniqueLanes:
         index = dr.compress(keep)
@@ -382,13 +306,14 @@ def _lit(hits: _Hits, wo: mi.Vector3f, weight: mi.Color3f, keep: mi.Bool) -> Cal
             dr.gather(mi.Color3f, weight, index),
             dr.gather(mi.UInt32, hits.position, index),
             tuple(dr.gather(type(value), value, index) for value in hits.held),
+            returned=returned and tuple(dr.gather(mi.Color3f, part, index) for part in returned),
         )
         return lanes if hits.plugin is None or dr.width(index) == 0 else _parted(lanes, hits, index)
 
     return kept
 
 
-def _parted(lanes: TechniqueLanes, hits: _Hits, index: mi.UInt32) -> TechniqueLanes:
+def _parted(lanes: TechniqueLanes, hits: TargetHits, index: mi.UInt32) -> TechniqueLanes:
     """Lanes of a mix: what its held materials show, and weights for the fitted one, or all that may change, alone."""
     own = dr.gather(mi.SurfaceInteraction3f, hits.own, index)
     wo = lanes.wo
@@ -397,4 +322,4 @@ def _parted(lanes: TechniqueLanes, hits: _Hits, index: mi.UInt32) -> TechniqueLa
     others = hits.plugin.held_value(own, wo) * lanes.weight
     weight = lanes.weight if hits.plugin.is_open else lanes.weight * hits.plugin.fitted.weight_at(own)
     dr.eval(others, weight)
-    return replace(lanes, weight=weight, others=others)
+    return replace(lanes, weight=weight, others=others, returned=lanes.returned if hits.plugin.is_open else None)

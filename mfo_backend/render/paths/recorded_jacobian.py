@@ -21,9 +21,9 @@ from ...material.arrays.dual import Dual, cast
 from ...material.arrays.own_memory import own_memory
 from ...material.recorded_models import RecordedModel
 from ...types.parameter import ParameterTable, Value
+from ..models.varying_values import VaryingValues
 from .packed_lanes import Lanes
 from .recorded_paths import LaneGroups
-from .varying_values import VaryingValues
 
 
 @contextmanager
@@ -106,9 +106,11 @@ class RecordedJacobian:
         lanes: Lanes,
         groups: LaneGroups,
         pictures: tuple[Any, ...] | None = None,
+        growth: tuple[Any, ...] = (),
     ) -> NDArray[np.float32]:
         """Mean radiance of the groups, whose `lanes` these are, without the constant part, then its derivatives:
-        (samples, g, 3, 1 + K). `pictures` may stand in for those that a graph gives at the vector."""
+        (samples, g, 3, 1 + K). `pictures` may stand in for those that a graph gives at the vector, and `growth` says by
+        what light that returns to the target has grown, which is then the last of the lanes' arrays."""
         width = self._width
         theta = own_memory(vector, mi.Float)
         if pictures is None:
@@ -121,15 +123,19 @@ class RecordedJacobian:
         # waits for a lock which this one holds
         with _no_garbage_collection():
             places = (lanes.start, lanes.stop, lanes.step)
-            self._launch(theta, self._constants, pictures, lanes.arrays, *places, scale, out)
+            self._launch(theta, self._constants, pictures, lanes.arrays, growth, *places, scale, out)
         self.evaluations += 1
         return groups.add_parts(out.numpy().reshape(-1, 3, width))
 
-    def _kernel(self, theta, constants, pictures, arrays, start, stop, step, scale, out):
+    def _kernel(self, theta, constants, pictures, arrays, growth, start, stop, step, scale, out):
         width = self._width
+        factors = self._factors(growth[0]) if growth else []
 
         def body(lane, stop, sums):
             wi, wo, weight, *held = (dr.gather(type(array), array, lane) for array in arrays)
+            if growth:
+                *held, returned = held
+                weight = self._grown(weight, returned, factors)
             columns = self._columns(theta, constants, pictures, wi, wo, weight, held)
             return (
                 lane + step,
@@ -163,6 +169,20 @@ class RecordedJacobian:
         if not self._derivatives:
             return [mi.Color3f(result)]
         return [mi.Color3f(c) for c in (result.value, *(result.slopes.get(k, 0.0) for k in range(self.table.length)))]
+
+    def _factors(self, growth) -> list[mi.Color3f]:
+        """By how much light that returns has grown, and the derivatives of that."""
+        return [
+            mi.Color3f(*(dr.gather(mi.Float, growth, mi.UInt32(channel * self._width + k)) for channel in range(3)))
+            for k in range(self._width)
+        ]
+
+    def _grown(self, weight, returned, factors):
+        """The weight of a lane with light that returns and has grown."""
+        weight = weight + returned * (factors[0] - 1.0)
+        if not self._derivatives:
+            return weight
+        return Dual(weight, {k: returned * slope for k, slope in enumerate(factors[1:])})
 
     def _warm_up(self) -> None:
         """Let the model load its tables: a frozen launch cannot.

@@ -27,7 +27,7 @@ from ...types.image import Pixels
 from ..camera.primary_rays import TILE, quarter
 
 ENOUGH_PARTS = 4096  # kernel lanes that keep the vector units of a few cores busy
-BYTES_PER_LANE = 36  # three float32 each for wi, wo and the weight
+BYTES_PER_LANE, BYTES_OF_RETURNED = 36, 12  # three float32 each for wi, wo and the weight
 
 
 @dataclass(frozen=True, eq=False)
@@ -147,6 +147,25 @@ class LaneGroups:
         return (sums / count[:, None]).astype(np.float32)
 
 
+@dataclass(frozen=True, eq=False)
+class ReturnedLight:
+    """What a recording's lanes have of light that the target itself has reflected before.
+
+    Attributes
+    ----------
+    weight
+        That part of each lane's weight.
+    order
+        How often it was reflected in the mean, (3,), weighed by radiance, for each channel.
+    share
+        The part of all lanes' weight that it is, (3,).
+    """
+
+    weight: mi.Color3f
+    order: NDArray[np.float64]
+    share: NDArray[np.float64]
+
+
 @dataclass(frozen=True)
 class RecordedPaths:
     """All lanes of one recording, ordered by tile, then pixel.
@@ -170,6 +189,10 @@ class RecordedPaths:
         elsewhere.
     constant_difference
         Half the difference of two samples of `constant`; None where it has no noise of the light.
+    returned
+        Light that the target has reflected before; None where lanes have none or hold it as known.
+    vector
+        The values that were free, as they were for this light.
     held
         Values that a texture gives the material, by name: one number or colour for each lane.
     """
@@ -184,6 +207,8 @@ class RecordedPaths:
     constant: Pixels
     held: Mapping[str, Any] = field(default_factory=dict)
     constant_difference: Pixels | None = None
+    returned: ReturnedLight | None = None
+    vector: NDArray[np.float64] | None = None
 
     @property
     def lanes(self) -> int:
@@ -194,7 +219,7 @@ class RecordedPaths:
     def bytes(self) -> int:
         """Memory of the lanes."""
         floats = sum(1 if isinstance(value, (mi.Float, mi.UInt32)) else 3 for value in self.held.values())
-        return self.lanes * (BYTES_PER_LANE + 4 * floats)
+        return self.lanes * (BYTES_PER_LANE + 4 * floats + (0 if self.returned is None else BYTES_OF_RETURNED))
 
     @property
     def interior(self) -> NDArray[np.bool_]:

@@ -11,6 +11,7 @@ import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property, partial
+from typing import Any
 
 import mitsuba as mi
 import numpy as np
@@ -26,6 +27,7 @@ from ..lamps.met_lamps import lights_have_no_extent
 from ..machine.memory import require_memory
 from ..models.joined_graph import Graph
 from ..models.scene_values import values_in_scene
+from ..models.varying_values import VaryingValues
 from ..pictures.mitsuba_renderer import MitsubaRenderer
 from ..pictures.pass_counter import with_derivatives
 from .indirect_share import indirect_share
@@ -36,7 +38,7 @@ from .record_settings import RecordSettings
 from .recorded_image import RecordedImage, TwoSamples
 from .recorded_jacobian import RecordedJacobian
 from .recorded_paths import LaneGroups, RecordedPaths
-from .varying_values import VaryingValues
+from .returned_light import ReturnedGrowth
 
 # Light over other surfaces below this share of the direct light is left out: it moves the picture by less than the
 # noise of 64 samples a pixel.
@@ -62,15 +64,13 @@ DIRECT, DEEPEST_RECORDED = 2, 16  # path length of light that comes from lights 
 class SceneNeeds:
     """What a recording of this scene has to hold, and why something is left out (sentences for the report).
 
-    `indirect` is the light over other surfaces that it holds, relative to the direct light; `own` is the part of all
-    light that a shell which light comes through may have given itself.
+    `held` is the part of all light that the target may have sent out before and that lanes take as known.
     """
 
     sampled: bool
     depth: int
     notes: tuple[str, ...]
-    indirect: float = 0.0
-    own: float = 0.0
+    held: float = 0.0
 
 
 class RecordedScene:
@@ -167,7 +167,8 @@ class RecordedScene:
         if share < NEGLIGIBLE_INDIRECT and not self._walks:  # the probe knows none of what goes through surfaces
             note = f"Light over other surfaces is left out: it is {100 * share:.2g} % of the direct light."
             return SceneNeeds(sampled, DIRECT, (note,))
-        return SceneNeeds(True, depth, (), share, share / (1.0 + share) if self._through else 0.0)
+        closed = self._mixed and not self.renderer.shape.bsdf().is_open
+        return SceneNeeds(True, depth, (), share / (1.0 + share) if self._walks or closed else 0.0)
 
     def record(
         self,
@@ -198,29 +199,13 @@ class RecordedScene:
         stride = max(1, math.ceil(math.sqrt(lanes / (self._part * MOST_LANES))), int(math.sqrt(lanes / enough)))
         stride, pixels = self._affordable(grid, stride, samples, sampled=needs.sampled)
         highlights = highlights or (self._highlights(vector) if near else Highlights(share=SHARE_FIRST))
-        settings = RecordSettings(
-            grid=grid,
-            seed=seed,
-            depth=needs.depth,
-            proposal=self._proposal(vector, near=near),
-            hide_emitters=bool(getattr(self._integrator, "hide_emitters", False)),
-            stride=stride,
-            two_sided=self.model.two_sided,
-            held=self._kept,
-            bumped=self._bumped,
-            cut_out=self._cut_out,
-            walks=(NEAR_WALKS if near else FAR_WALKS) if self._walks else (),
+        self.renderer.counter.add(1.0)
+        return self._recorded(
+            vector, near=near, grid=grid, seed=seed, depth=needs.depth, samples=samples, stride=stride, pixels=pixels,
             surface=None if self._varying is None else self._varying.surface(vector),
-            mixed=self._mixed,
-            light_paths=self.renderer.light_paths,
-            pixels=pixels,
             # beside the noise of walks a highlight on the plain grid is exact
             highlights=None if self._walks else highlights,
-            samples=samples,
-            glows=self._glows,
-        )
-        self.renderer.counter.add(1.0)
-        return record_paths(self.renderer.scene, self.renderer.shape, settings)
+        )  # fmt: skip
 
     def record_from(
         self,
@@ -241,25 +226,31 @@ class RecordedScene:
             If no pixel sees the target.
         """
         self.renderer.show(vector)
+        return self._recorded(
+            vector, near=True, grid=grid, seed=seed, depth=self.needs.depth, pixels=pixels, sensor=sensor,
+            samples=2 if self.needs.sampled else 1, allow_dark=True,
+        )  # fmt: skip
+
+    def _recorded(
+        self, vector: NDArray[np.float64], *, near: bool, allow_dark: bool = False, **further: Any
+    ) -> RecordedPaths:
+        """A recording of the material `vector`, which the scene shows, by this scene's settings and `further` ones."""
+        walks = NEAR_WALKS if near else FAR_WALKS
         settings = RecordSettings(
-            grid=grid,
-            seed=seed,
-            depth=self.needs.depth,
-            proposal=self._proposal(vector, near=True),
+            proposal=self._proposal(vector, near=near),
             hide_emitters=bool(getattr(self._integrator, "hide_emitters", False)),
             two_sided=self.model.two_sided,
             held=self._kept,
             bumped=self._bumped,
             cut_out=self._cut_out,
-            walks=NEAR_WALKS if self._walks else (),
+            walks=walks if self._walks else (),
             mixed=self._mixed,
             light_paths=self.renderer.light_paths,
-            samples=2 if self.needs.sampled else 1,
             glows=self._glows,
-            pixels=pixels,
-            sensor=sensor,
+            **further,
         )
-        return record_paths(self.renderer.scene, self.renderer.shape, settings, allow_dark=True)
+        paths = record_paths(self.renderer.scene, self.renderer.shape, settings, allow_dark=allow_dark)
+        return replace(paths, vector=vector.copy())
 
     def finest_grid(self, samples: int, lanes: float) -> int:
         """The finest grid with which a recording of so many samples of the light holds every tile in so many lanes, or
@@ -317,12 +308,17 @@ class RecordedScene:
         """
         constant = _constant(paths, groups)
         lanes, cost = Lanes.as_recorded(paths, groups, self._held), self._share(groups)
+        growth = ReturnedGrowth(paths, self._image, self._held)
 
         def at(vector: NDArray[np.float64]) -> TwoSamples:
             self.renderer.counter.add(cost)
-            return TwoSamples.of(self._image(vector, lanes, groups), *constant)
+            return TwoSamples.of(self._image(vector, lanes, groups, growth=growth(vector)), *constant)
 
         return RecordedImage(at, 2)
+
+    def returned_change(self, paths: RecordedPaths, vector: NDArray[np.float64]) -> float:
+        """The part of all light by which that has changed which returns to the target, since it was recorded."""
+        return ReturnedGrowth(paths, self._image, self._held).change(vector)
 
     def images_of(
         self, paths: RecordedPaths, groups: LaneGroups, vector: NDArray[np.float64]
@@ -331,10 +327,12 @@ class RecordedScene:
         constant, varying = groups.average(paths.constant), self._evaluated
         assert varying is not None
         lanes, cost = Lanes.as_recorded(paths, groups, self._held), self._share(groups)
+        growth = ReturnedGrowth(paths, self._image, self._held)
 
         def at(pictures: Mapping[str, NDArray[np.float32]]) -> NDArray[np.float32]:
             self.renderer.counter.add(cost)
-            samples = self._image(vector, lanes, groups, varying.plain_arrays(pictures))
+            arrays = varying.plain_arrays(pictures)
+            samples = self._image(vector, lanes, groups, arrays, growth(vector, arrays))
             return TwoSamples.of(samples, constant).mean[:, :, 0]
 
         return at
@@ -355,9 +353,11 @@ class RecordedScene:
         lanes = LaneReader(Lanes.as_recorded(paths, groups, self._held))
         cost = with_derivatives(self._share(groups), self.renderer.table.length)
         varying = self._evaluated if coarser else None
+        growth = ReturnedGrowth(paths, self.jacobian, self._held)
 
         def at(vector: NDArray[np.float64]) -> TwoSamples:
-            samples = self.jacobian(vector, lanes(), groups, varying and varying.coarser_arrays(vector))
+            arrays = varying and varying.coarser_arrays(vector)
+            samples = self.jacobian(vector, lanes(), groups, arrays, growth(vector, arrays))
             self.renderer.counter.add(cost)
             return TwoSamples.of(samples, *constant)
 

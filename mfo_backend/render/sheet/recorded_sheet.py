@@ -20,10 +20,11 @@ from numpy.typing import NDArray
 from ...types.errors import BadInputError
 from ...types.image import Pixels
 from ..models.joined_graph import JoinedGraph
+from ..models.varying_values import SUBPIXEL
+from ..paths.merged_lanes import summed
 from ..paths.recorded_image import RecordedImage
-from ..paths.recorded_paths import LaneGroups, RecordedPaths
+from ..paths.recorded_paths import LaneGroups, RecordedPaths, ReturnedLight
 from ..paths.recorded_scene import MOST_LANES, RecordedScene, SceneNeeds
-from ..paths.varying_values import SUBPIXEL
 from .contact_sheet import ContactSheet
 from .sheet_renderer import SheetRenderer
 
@@ -74,8 +75,7 @@ class RecordedSheet:
         found = [scene.needs for scene in self._scenes]
         depth = max(needs.depth for needs in found)
         notes = found[0].notes if depth == 2 else ()
-        indirect, own = max(n.indirect for n in found), max(n.own for n in found)
-        return SceneNeeds(any(n.sampled for n in found), depth, notes, indirect, own)
+        return SceneNeeds(any(n.sampled for n in found), depth, notes, max(n.held for n in found))
 
     def record(
         self,
@@ -108,6 +108,10 @@ class RecordedSheet:
         return min(
             scene.finest_grid(samples, part * lanes) for scene, part in zip(self._scenes, self._parts, strict=True)
         )
+
+    def returned_change(self, paths: RecordedPaths, vector: NDArray[np.float64]) -> float:
+        """See `RecordedScene.returned_change`."""
+        return self._scenes[0].returned_change(paths, vector)
 
     def images_of(
         self, paths: RecordedPaths, groups: LaneGroups, vector: NDArray[np.float64]
@@ -148,20 +152,38 @@ def joined(recorded: Mapping[int, RecordedPaths], sheet: ContactSheet) -> Record
             ranges.append((number, int(first[0]), int(first[-1]) - int(first[0]), total))
             total += int(first[-1]) - int(first[0])
         begins.append(np.concatenate([*row, [total]]))
-    weights = (paths.weight * dr.opaque(mi.Float, sheet.gains[number]) for number, paths in recorded.items())
+    gains = [dr.opaque(mi.Float, sheet.gains[number]) for number in recorded]
     merge = partial(_merged, ranges=ranges, total=total)
     tiles = np.cumsum([0, *(int(paths.tile.max(initial=-1)) + 1 for paths in parts)])
     return RecordedPaths(
         wi=merge([paths.wi for paths in parts]),
         wo=merge([paths.wo for paths in parts]),
-        weight=merge(list(weights)),
+        weight=merge([paths.weight * gain for paths, gain in zip(parts, gains, strict=True)]),
         pixel=np.concatenate([sheet.on_sheet(paths.pixel, number) for number, paths in recorded.items()]),
         tile=np.concatenate([paths.tile + begin for paths, begin in zip(parts, tiles[:-1], strict=True)]),
         first=np.stack(begins),
         coverage=np.concatenate([paths.coverage for paths in parts]),
         constant=_on_sheet({number: paths.constant for number, paths in recorded.items()}, sheet),
         held={name: merge([paths.held[name] for paths in parts]) for name in parts[0].held},
+        returned=_returned_light(parts, gains, merge),
+        vector=parts[0].vector,
     )
+
+
+def _returned_light(
+    parts: Sequence[RecordedPaths], gains: Sequence[mi.Float], merge: Callable[[list[mi.Color3f]], mi.Color3f]
+) -> ReturnedLight | None:
+    """Light that returns to the target in all pictures, reflected as often as in the mean of them."""
+    if all(paths.returned is None for paths in parts):
+        return None
+    none = mi.Color3f(dr.zeros(mi.Float, max(paths.lanes for paths in parts)))
+    lights = [paths.returned for paths in parts]
+    weights = [none if light is None else light.weight * gain for light, gain in zip(lights, gains, strict=True)]
+    sums = np.array([summed(weight) for weight in weights])
+    orders = np.array([np.ones(3) if light is None else light.order for light in lights])
+    total = sum(summed(paths.weight * gain) for paths, gain in zip(parts, gains, strict=True))
+    order = (sums * orders).sum(axis=0) / np.maximum(sums.sum(axis=0), 1e-30)
+    return ReturnedLight(merge(weights), order, sums.sum(axis=0) / total)
 
 
 def _on_sheet(pictures: Mapping[int, Pixels], sheet: ContactSheet) -> Pixels:

@@ -21,7 +21,7 @@ import mitsuba as mi
 from mitsuba.ad.integrators.common import RBIntegrator  # pyright: ignore[reportMissingImports]
 
 from ...material.plugins.material_kinds import MaterialKinds
-from ...material.plugins.ray_kinds import CAMERA, SCATTERED, kind_of_ray
+from ...material.plugins.ray_kinds import CAMERA, GLOSSY, SCATTERED, kind_of_ray
 from ...types.light_paths import NO_LIMIT, TRANSPARENT_BOUNCES, LightPaths
 from ..lamps.met_lamps import SceneLamps, alone
 from .absorption import Inside
@@ -55,6 +55,11 @@ class CyclesPath(RBIntegrator):
         self.fewest = tuple(int(props.get(name, 0)) for name in _FEWEST)
         self.limits = tuple(int(props.get(name, NO_LIMIT)) for name in _LIMITS)
 
+    def left_after(self, left: mi.UInt32, diffuse: mi.UInt32, glossy: mi.UInt32, through: mi.UInt32) -> mi.UInt32:
+        """How much further a path goes after so many bounces of each kind: behind the last it meets lights alone."""
+        done = (diffuse > self.limits[0]) | (glossy > self.limits[1]) | (through > self.limits[2])
+        return dr.select(done, dr.minimum(left, 1), left)
+
     @dr.syntax
     def sample(
         self,
@@ -71,6 +76,8 @@ class CyclesPath(RBIntegrator):
         walked: bool = False,
         kind: Any = SCATTERED,
         weighed: Any = 0,
+        went_through: Any = False,
+        target: Any = None,
         **_: Any,
     ) -> tuple[Any, Any, list[Any], Any]:
         """See `RBIntegrator.sample`; a path with `before`, density and weight of a bounce, begins after it.
@@ -79,7 +86,10 @@ class CyclesPath(RBIntegrator):
         lights have no extent `every_lamp` sums the light of all of them where a camera ray ends, and further on one is
         drawn; it has no derivatives. With `walked` somebody else adds what comes from below the first hit
         (`exit_light`); for camera rays that is the first behind cut-outs. The bounce before has sent out rays of a
-        `kind` (`by_ray`), and its light samples are `weighed` against rays of this density that go straight on.
+        `kind` (`by_ray`), perhaps `went_through` the surface, and its light samples are `weighed` against rays of this
+        density that go straight on.
+        With a `target`, a pointer to its shape, the third answer is the radiance that it has reflected on the way, and
+        that times how often.
         """
         primal = mode == dr.ADMode.Primal
         lamps, shadows = SceneLamps(scene), ShadowRays(scene)
@@ -95,6 +105,13 @@ class CyclesPath(RBIntegrator):
         bounce = mi.UInt32(0 if before is None else 1)
         left = mi.UInt32(self.max_depth)
         diffuse, glossy, through = mi.UInt32(0), mi.UInt32(0), mi.UInt32(0)
+        if before is not None:
+            reflected_by, passed = mi.Float(kind), mi.Bool(went_through)
+            diffuse = mi.UInt32(dr.select(~passed & (reflected_by == SCATTERED), 1, 0))
+            glossy = mi.UInt32(dr.select(~passed & (reflected_by == GLOSSY), 1, 0))
+            through = mi.UInt32(dr.select(passed, 1, 0))
+            left = self.left_after(left, diffuse, glossy, through)
+        most = mi.UInt32(left)
         previous = dr.zeros(mi.Interaction3f)
         density = mi.Float(1)
         delta = mi.Bool(True)
@@ -107,6 +124,7 @@ class CyclesPath(RBIntegrator):
         inside, dimmed = absorption.outside(), mi.Color3f(1)
         active = mi.Bool(active)
         valid = mi.Bool(False)
+        reflected, own, counted = mi.UInt32(0), mi.Color3f(0), mi.Color3f(0)
         known = met is not None
         hidden = self.hide_emitters and before is None
 
@@ -145,7 +163,7 @@ class CyclesPath(RBIntegrator):
 
             # light that the last direction meets
             ds = met_light(scene, si, previous)
-            beyond = active & ((left < self.max_depth) | (passages > 0)) if known else active
+            beyond = active & ((left < most) | (passages > 0)) if known else active
             seen = beyond & ~((bounce == 0) & hidden & ~si.is_valid())
             light_density = scene.pdf_emitter_direction(previous, ds, seen & ~delta)
             emission = ds.emitter.eval(si, seen)
@@ -202,6 +220,14 @@ class CyclesPath(RBIntegrator):
             goes_on &= dr.any(throughput * ratio != 0)
             goes_on &= is_straight | (scatters & leaves_on(scene, si, bs.wo, is_through))
 
+            if dr.hint(target is not None, mode="scalar"):
+                at_target = si.shape == target
+                own += dr.select(reflected > 0, shown, 0)
+                counted += mi.Float(reflected) * shown
+                times = reflected + dr.select(at_target & (si.wi.z * si.to_local(ds.d).z > 0), 1, 0)
+                own += dr.select(times > 0, direct, 0)
+                counted += mi.Float(times) * direct
+                reflected[goes_on & ~is_straight & at_target & ~is_through] += 1
             if dr.hint(primal, mode="scalar"):
                 radiance += shown + direct
             else:
@@ -230,8 +256,7 @@ class CyclesPath(RBIntegrator):
             if dr.hint(by_ray, mode="scalar"):
                 kind = dr.select(counts, kind_of_ray(bs.sampled_type), kind)
             straight_on = mi.Bool(is_straight)
-            done = (diffuse > self.limits[0]) | (glossy > self.limits[1]) | (through > self.limits[2])
-            left = dr.select(done, dr.minimum(left, 1), left)
+            left = self.left_after(left, diffuse, glossy, through)
             least[counts] = dr.minimum(least, dr.select(bs.pdf > 0, bs.pdf, least))
             bounce[sent] += 1
             throughput *= ratio
@@ -244,7 +269,7 @@ class CyclesPath(RBIntegrator):
             if dr.hint(known, mode="scalar"):
                 met = scene.ray_intersect_preliminary(ray, active=active)
 
-        return radiance if primal else change, valid, [], radiance
+        return radiance if primal else change, valid, [] if target is None else [own, counted], radiance
 
 
 @dr.syntax

@@ -7,6 +7,7 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from typing import Any
 
 import drjit as dr
@@ -17,6 +18,21 @@ from ...material.plugins.ray_kinds import GLOSSY, SCATTERED, is_by_ray
 from ...types.light_paths import LightPaths
 
 
+@dataclass(frozen=True)
+class SentOn:
+    """Radiance of rays, scene-linear, what of it the target has reflected on its way, and that times how often."""
+
+    radiance: mi.Color3f
+    reflected: mi.Color3f
+    counted: mi.Color3f
+
+    def __add__(self, other: SentOn) -> SentOn:
+        return SentOn(self.radiance + other.radiance, self.reflected + other.reflected, self.counted + other.counted)
+
+    def __mul__(self, factor: mi.Float) -> SentOn:
+        return SentOn(self.radiance * factor, self.reflected * factor, self.counted * factor)
+
+
 def traced_radiance(
     scene: mi.Scene,
     sampler: mi.Sampler,
@@ -25,27 +41,37 @@ def traced_radiance(
     depth: int,
     *,
     hide: bool = False,
-    before: tuple[mi.Float, mi.Color3f] | None = None,
-    met: mi.PreliminaryIntersection3f | None = None,
-    walked: bool = False,
-    kind: Any = SCATTERED,
-    weighed: Any = 0,
+    **further: Any,
 ) -> mi.Color3f:
     """Radiance along `ray` over paths of up to `depth`, scene-linear; `hide` leaves lights that it meets out.
 
-    `before` is the density and weight of a bounce the ray comes from. With what it has `met`, the emission of that is
-    left out; `walked`, `kind` and `weighed` are those of `cycles_path`.
+    Further arguments are those of `cycles_path`: `before` is the density and weight of a bounce the ray comes from.
+    With what it has `met`, the emission of that is left out.
     """
+    return _traced(scene, sampler, ray, light_paths, depth, hide=hide, **further)[0]
+
+
+def _traced(
+    scene: mi.Scene,
+    sampler: mi.Sampler,
+    ray: mi.Ray3f,
+    light_paths: LightPaths | None,
+    depth: int,
+    *,
+    hide: bool = False,
+    **further: Any,
+) -> tuple[mi.Color3f, list[mi.Color3f]]:
+    """`traced_radiance`, and what `cycles_path` tells of a target that is among the `further` arguments."""
     from .cycles_path import PLUGIN_NAME, light_path_properties, register  # can be imported when a variant is set
 
     register()
     properties: dict[str, Any] = {"type": PLUGIN_NAME, "max_depth": depth, "hide_emitters": hide}
     camera_world = getattr(scene.integrator(), "camera_world", None)
-    if camera_world is not None and before is None:
+    if camera_world is not None and further.get("before") is None:
         properties["camera_world"] = camera_world
     integrator = mi.load_dict(properties | light_path_properties(light_paths or LightPaths()))
-    further = {"before": before, "met": met, "walked": walked, "kind": kind, "weighed": weighed}
-    return integrator.sample(dr.ADMode.Primal, scene, sampler, ray, **further)[0]
+    radiance, _, told, _ = integrator.sample(dr.ADMode.Primal, scene, sampler, ray, **further)
+    return radiance, told
 
 
 def tells_rays(scene: mi.Scene, target: Any, light_paths: LightPaths | None) -> bool:
@@ -55,7 +81,7 @@ def tells_rays(scene: mi.Scene, target: Any, light_paths: LightPaths | None) -> 
 
 def sent_on(
     scene: mi.Scene,
-    target: Any,
+    target: mi.Shape,
     sampler: mi.Sampler,
     ray: mi.Ray3f,
     light_paths: LightPaths | None,
@@ -64,20 +90,29 @@ def sent_on(
     si: mi.SurfaceInteraction3f,
     wo: mi.Vector3f,
     met: mi.PreliminaryIntersection3f,
-) -> mi.Color3f:
+    by_chance: mi.Float,
+) -> SentOn:
     """Radiance along rays that the `target`'s BSDF sends out from `si` along `wo`, but the emission of what they `met`.
 
     Where surfaces tell rays of a diffuse lobe from those of a glossy one, both are traced and count by what the target
     draws the direction by. To draw one of them had five times the noise (a room behind a pane that is glass to some).
     """
+    bsdf, pointer = target.bsdf(), mi.ShapePtr(target)
+    dr.make_opaque(pointer)  # its number in this process is no part of the kernel
+
+    def traced(**further: Any) -> SentOn:
+        further |= {"met": met, "target": pointer, "went_through": si.wi.z * wo.z < 0.0}
+        radiance, told = _traced(scene, sampler, ray, light_paths, depth, **further)
+        return SentOn(radiance, *told)
+
     if light_paths is None:
-        return traced_radiance(scene, sampler, ray, light_paths, depth, met=met)
+        return traced()
     value, likely = MaterialKinds(scene).eval_pdf(si.bsdf(), mi.BSDFContext(), si, wo, mi.Bool(True))
     before = (likely, value / dr.maximum(likely, 1e-12))
-    if not tells_rays(scene, target, light_paths):
-        return traced_radiance(scene, sampler, ray, light_paths, depth, before=before, met=met)
-    share, radiance = target.glossy_share(si, wo), mi.Color3f(0.0)
-    for kind, part in ((GLOSSY, share), (SCATTERED, 1.0 - share)):
-        further = {"before": before, "met": met, "kind": kind, "weighed": likely}
-        radiance += part * traced_radiance(scene, sampler, ray, light_paths, depth, **further)
-    return radiance
+    if not hasattr(bsdf, "glossy_share"):
+        return traced(before=before)
+    share = bsdf.glossy_share(si, wo)
+    if not is_by_ray(scene):  # the kind only counts for the limits of bounces
+        return traced(before=before, kind=dr.select(by_chance < share, GLOSSY, SCATTERED))
+    glossy, scattered = (traced(before=before, kind=kind, weighed=likely) for kind in (GLOSSY, SCATTERED))
+    return glossy * share + scattered * (1.0 - share)

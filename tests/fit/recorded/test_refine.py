@@ -63,14 +63,22 @@ def test_a_recording_that_is_too_old_is_made_anew(refined):
         assert error < 0.3 * stale, guards
 
 
-def test_light_that_the_target_gives_itself_makes_a_recording_old_sooner():
+@pytest.mark.parametrize(
+    ("held", "returned", "old"),
+    [
+        (0.0, 0.0, [0.16]),  # a ball in the open
+        (0.0, 0.006, [0.001, 0.004, 0.014, 0.16]),  # what changed may cancel what came back
+        (0.33, 0.0, [0.02, 0.16]),  # walks below the surface, light over others a third of all
+    ],
+    ids=["none", "followed", "held"],
+)
+def test_light_that_returns_makes_a_recording_old_sooner(held, returned, old):
     from mfo_backend.fit.recorded.refine import _is_old
 
-    # nothing over other surfaces; half as much as directly, a third of all; as in a closed room of light walls
-    limits = {
-        indirect: [c for c in (0.01, 0.02, 0.04, 0.14, 0.16) if _is_old(c, indirect)] for indirect in (0.0, 0.5, 2.0)
-    }
-    assert limits == {0.0: [0.16], 0.5: [0.04, 0.14, 0.16], 2.0: [0.02, 0.04, 0.14, 0.16]}
+    scene = SimpleNamespace(needs=SimpleNamespace(held=held), returned_change=lambda paths, x: returned)
+    recording = SimpleNamespace(setting=SimpleNamespace(scene=scene), paths=None)
+    changes = (0.001, 0.004, 0.014, 0.02, 0.16) if held else (0.001, 0.004, 0.014, 0.16)
+    assert [c for c in changes if _is_old(recording, c, np.zeros(1))] == old
 
 
 def test_a_recording_that_is_too_noisy_is_made_anew_with_more_rays(refined):

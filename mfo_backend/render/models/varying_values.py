@@ -21,8 +21,8 @@ from ...material.plugins.seen_surface import SeenSurface
 from ...material.principled.bumped_normals import turned_to_normals
 from ...material.principled.principled_dict import DIRECTIONS
 from ...types.parameter import ParameterTable
-from ..models.graph_pictures import GraphPictures, GraphState
-from ..models.joined_graph import Graph
+from .graph_pictures import GraphPictures, GraphState
+from .joined_graph import Graph
 
 SUBPIXEL = "subpixel"  # of each lane, in the pictures; the row behind the last where the camera does not see the hit
 FRAME = ("frame_s", "frame_t", "frame_n")  # the lane's frame in the world

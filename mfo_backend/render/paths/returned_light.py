@@ -1,0 +1,98 @@
+# SPDX-License-Identifier: Apache-2.0
+"""How light that the target has reflected before changes with its material.
+
+A path over other surfaces that has met the target before carries its albedo as a factor, once for each time. A lane of
+weight w keeps the part P of it that the target has reflected at least once, a recording how often, m, in the mean. With
+the albedo a(x) of a material, and a(x_0) of that of the recording, the weight is
+
+    w(x) = w + P ((a(x) / a(x_0))^m - 1)
+
+channel by channel. It is exact where all of P was reflected equally often by one albedo for all directions; elsewhere
+its slope by the albedo is right in the mean. What comes through the target to other places of it is taken as known.
+"""
+
+# pyright: reportArgumentType=false, reportCallIssue=false, reportOperatorIssue=false, reportAssignmentType=false
+# pyright: reportReturnType=false, reportIndexIssue=false, reportGeneralTypeIssues=false
+# Mitsuba's stubs describe its scalar variant, where a vector is no array of vectors.
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import drjit as dr
+import mitsuba as mi
+import numpy as np
+from numpy.typing import NDArray
+
+from ...material.arrays.own_memory import own_memory
+from ..random_numbers.even_points import even_points
+from .packed_lanes import Lanes
+from .proposal import DefensiveProposal
+from .recorded_jacobian import RecordedJacobian
+from .recorded_paths import LaneGroups, RecordedPaths
+
+ALBEDO_LANES = 4096  # pairs of directions, at as many places
+LEAST_ALBEDO = 1e-4  # for a division: what a blacker target reflects shows nothing
+
+
+class ReturnedGrowth:
+    """The factor (a(x) / a(x_0))^m of a recording's light that returns, with derivatives where `image` has them.
+
+    The albedo is that for light from all sides: a mean over pairs of directions, and over places of the recording.
+    """
+
+    def __init__(self, paths: RecordedPaths, image: RecordedJacobian, held: Sequence[str]) -> None:
+        self._image, self._returned = image, paths.returned
+        if self._returned is None:
+            return
+        assert paths.vector is not None
+        self._lanes, self._group = _albedo_lanes(paths, held)
+        self._known = np.maximum(self._albedo(paths.vector)[:, :1], LEAST_ALBEDO)
+
+    def __call__(self, vector: NDArray[np.float64], pictures: tuple[Any, ...] | None = None) -> tuple[mi.Float, ...]:
+        """The factor and its derivatives, 3 (1 + K) numbers channel by channel, or nothing where no light returns.
+
+        `pictures` may stand in for those that a graph gives at the vector.
+        """
+        factor = self._factor(vector, pictures)
+        return () if factor is None else (own_memory(factor.ravel(), mi.Float),)
+
+    def change(self, vector: NDArray[np.float64]) -> float:
+        """The part of all light by which what returns has changed, in the channel where it is most."""
+        factor = self._factor(vector)
+        if factor is None or self._returned is None:
+            return 0.0
+        return float(np.max(self._returned.share * np.abs(factor[:, 0] - 1.0)))
+
+    def _factor(
+        self, vector: NDArray[np.float64], pictures: tuple[Any, ...] | None = None
+    ) -> NDArray[np.float64] | None:
+        """The factor of each channel and its derivatives, (3, 1 + K)."""
+        if self._returned is None:
+            return None
+        order, ratio = self._returned.order[:, None], self._albedo(vector, pictures) / self._known
+        here = np.maximum(ratio[:, :1], LEAST_ALBEDO)
+        return np.concatenate([here**order, order * here ** (order - 1.0) * ratio[:, 1:]], axis=1)
+
+    def _albedo(self, vector: NDArray[np.float64], pictures: tuple[Any, ...] | None = None) -> NDArray[np.float64]:
+        """The albedo of each channel and its derivatives, (3, 1 + K)."""
+        return self._image(vector, self._lanes, self._group, pictures)[0, 0].astype(np.float64)
+
+
+def _albedo_lanes(paths: RecordedPaths, held: Sequence[str]) -> tuple[Lanes, LaneGroups]:
+    """Lanes whose sum is an albedo, with values that textures give at evenly spread lanes of a recording."""
+    number, zero = dr.arange(mi.UInt32, ALBEDO_LANES), dr.zeros(mi.UInt32, ALBEDO_LANES)
+    wi = mi.warp.square_to_cosine_hemisphere(mi.Point2f(*even_points(2, number, zero, 1, 0)))
+    lobe, *u = even_points(3, number, zero, 1, 1)
+    proposal = DefensiveProposal()
+    wo = proposal.sample(wi, lobe, mi.Point2f(*u))
+    density = proposal.density(wi, wo)
+    weight = mi.Color3f(dr.select(density > 0.0, 1.0 / (ALBEDO_LANES * density), 0.0))
+    place = own_memory(np.linspace(0, paths.lanes - 1, ALBEDO_LANES).astype(np.uint32), mi.UInt32)
+    values = tuple(dr.gather(type(paths.held[name]), paths.held[name], place) for name in held)
+    dr.eval(wi, wo, weight, values)
+    first = np.zeros(1, np.int64)
+    group = LaneGroups(first, np.arange(2), first, np.array([[0, ALBEDO_LANES]]))
+    start, stop, _ = group.parts
+    return Lanes((wi, wo, weight, *values), start, stop, dr.opaque(mi.UInt32, 1)), group
