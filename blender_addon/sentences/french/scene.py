@@ -219,7 +219,7 @@ SCENE = {
     "{} is fitted with the model blender_principled alone: choose that.": "{} n'est ajusté qu'avec le modèle blender_principled : le choisir.",
     "{} of material '{}' is linked to {}, which cannot be exported; the socket's own value is used.": "{} du matériau '{}' est lié à {}, qui ne peut pas être exporté ; la valeur propre de l'entrée est utilisée.",
     "{} of material '{}' is linked to {}: mend or unlink it.": "{} du matériau '{}' est lié à {} : le réparer ou le délier.",
-    "{} stays as it is: the colours of its shaders make up for any. Name it among the values to have it fitted, with those colours held.": "{} reste tel quel : les couleurs de ses shaders en compensent tout. Le nommer parmi les valeurs pour l'ajuster, ces couleurs gardées.",
+    "{} stays as it is: the colours of its shaders make up for it, up to white. Name it among the values to have it fitted, with those colours held.": "{} reste tel quel : les couleurs de ses shaders le compensent, jusqu'au blanc. Le nommer parmi les valeurs pour l'ajuster, ces couleurs gardées.",
     "{}: the {} of the node '{}' is missing; it is magenta, as in Cycles. If the reference shows it, find it first: File > External Data > Find Missing Files.": "{} : {} du nœud '{}' manque ; c'est magenta, comme dans Cycles. Si la référence le montre, le chercher d'abord : Fichier > Données externes > Trouver les fichiers manquants.",
     # pictures
     "All pictures are left out: leave one in at least.": "Toutes les images sont omises : en laisser au moins une.",

@@ -220,7 +220,7 @@ SCENE = {
     "{} is fitted with the model blender_principled alone: choose that.": "{} wird nur mit dem Modell blender_principled angepasst: dieses wählen.",
     "{} of material '{}' is linked to {}, which cannot be exported; the socket's own value is used.": "{} von Material '{}' ist verbunden mit: {}. Das kann nicht exportiert werden; der eigene Wert des Eingangs wird verwendet.",
     "{} of material '{}' is linked to {}: mend or unlink it.": "{} von Material '{}' ist verbunden mit: {}. Das richten oder die Verbindung lösen.",
-    "{} stays as it is: the colours of its shaders make up for any. Name it among the values to have it fitted, with those colours held.": "{} bleibt, wie es ist: die Farben seiner Shader gleichen jedes aus. Es unter den Werten nennen, um es bei festen Farben anzupassen.",
+    "{} stays as it is: the colours of its shaders make up for it, up to white. Name it among the values to have it fitted, with those colours held.": "{} bleibt, wie es ist: die Farben seiner Shader gleichen es aus, bis hin zu Weiß. Es unter den Werten nennen, um es bei festen Farben anzupassen.",
     "{}: the {} of the node '{}' is missing; it is magenta, as in Cycles. If the reference shows it, find it first: File > External Data > Find Missing Files.": "{}: {} des Nodes '{}' fehlt und ist magenta, wie in Cycles. Zeigt es die Referenz, es erst suchen: Datei > Externe Daten > Fehlende Dateien suchen.",
     # pictures
     "All pictures are left out: leave one in at least.": "Alle Bilder sind weggelassen: mindestens eines verwenden.",
