@@ -108,6 +108,40 @@ def test_a_target_whose_material_no_picture_shows_is_refused(
         export(item)
 
 
+@pytest.mark.parametrize("flag", ["is_holdout", "is_shadow_catcher"])
+def test_what_the_camera_sees_otherwise_is_none_of_the_surroundings(
+    scene: Any, export: Any, render_cycles: Any, mitsuba: Any, flag: str
+) -> None:
+    """Oracle: Cycles' picture of the truth, whose verdict hung on a green floor that no picture shows."""
+    from mfo_backend.fit.judge.verdict import judge
+    from mfo_backend.metrics.display.tone_mapping import DisplayView
+    from mfo_backend.types.image import Encoding, Image
+    from mfo_backend.types.verdict import Verdict
+
+    lit_scene(scene)
+    scene.cycles.samples = 256
+    corners = [(-3, -3, -4), (3, -3, -4), (3, 3, -4), (-3, 3, -4)]
+    floor = add_mesh("Floor", corners, [(0, 1, 2, 3)], new_material("Floor", Base_Color=(0.05, 0.4, 0.05)))
+    item = target()
+    # a reference whose surroundings are even counts as cut out
+    post = [(-3, -3, -3.9), (-2, -3, -3.9), (-2, 3, -3.9), (-3, 3, -3.9)]
+    add_mesh("Post", post, [(0, 1, 2, 3)], new_material("Post", Base_Color=(0.7, 0.2, 0.1)))
+    setattr(floor, flag, True)
+    renderer, truth = renderer_and_cycles(export, render_cycles, item)
+    picture, mask = renderer.image(renderer.start, seed=1, spp=256), renderer.target_mask()
+    otherwise = renderer.otherwise_mask()
+    assert otherwise.any()
+    reference = Image(np.ascontiguousarray(truth, np.float32), Encoding.LINEAR)
+    found = judge(reference, picture, mask, DisplayView(), others=otherwise)
+    assert found is not None
+    assert found.verdict is Verdict.SAME
+    without = judge(reference, picture, mask, DisplayView())
+    assert without is not None
+    assert without.verdict is Verdict.CLOSE
+    setattr(floor, flag, False)
+    assert not renderer_and_cycles(export, render_cycles, item)[0].otherwise_mask().any()
+
+
 def levels(export: Any, render_cycles: Any, target: Any) -> dict[str, Any]:
     """Means of both routes' pictures within the target over Cycles', RGB, less 1."""
     from mfo_backend.render.paths.recorded_scene import RecordedScene
