@@ -62,7 +62,7 @@ SCENE = {
     "Camera Cull is on: Cycles leaves objects outside the frame out; the fit has them.": "Camera Cull est actif : Cycles omet les objets hors du cadre ; l'ajustement les a.",
     "Distance Cull is on: Cycles leaves distant objects out; the fit has them.": "Distance Cull est actif : Cycles omet les objets lointains ; l'ajustement les a.",
     "Burn Into Image writes text into the picture; the fit has none.": "Incruster dans l'image écrit du texte dans l'image ; l'ajustement n'en a pas.",
-    "Freestyle draws lines into Cycles' picture; the fit has none.": "Freestyle trace des lignes dans l'image de Cycles ; l'ajustement n'en a pas.",
+    "Freestyle draws lines into Cycles' picture; the fit has none: turn it off and render the reference again.": "Freestyle trace des lignes dans l'image de Cycles ; l'ajustement n'en a pas : le désactiver et refaire le rendu de la référence.",
     "Compositing nodes are left out: a reference that went through them holds more than the render.": "Les nœuds de compositing sont omis : une référence qui y est passée contient plus que le rendu.",
     "World '{}' has colours beyond linear Rec.709, in which the fit counts: they are taken at its edge.": "Le monde '{}' a des couleurs hors de Rec.709 linéaire, dans lequel l'ajustement calcule : elles sont prises à sa limite.",
     "Light '{}' has a colour beyond linear Rec.709, in which the fit counts: it is at its edge.": "La lumière '{}' a une couleur hors de Rec.709 linéaire, dans lequel l'ajustement calcule : elle est à sa limite.",

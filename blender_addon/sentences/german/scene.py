@@ -63,7 +63,7 @@ SCENE = {
     "Camera Cull is on: Cycles leaves objects outside the frame out; the fit has them.": "Camera Cull ist an: Cycles lässt Objekte außerhalb des Bildes weg; die Anpassung hat sie.",
     "Distance Cull is on: Cycles leaves distant objects out; the fit has them.": "Distance Cull ist an: Cycles lässt ferne Objekte weg; die Anpassung hat sie.",
     "Burn Into Image writes text into the picture; the fit has none.": "Ins Bild einbrennen schreibt Text ins Bild; die Anpassung hat keinen.",
-    "Freestyle draws lines into Cycles' picture; the fit has none.": "Freestyle zeichnet Linien in das Bild von Cycles; die Anpassung hat keine.",
+    "Freestyle draws lines into Cycles' picture; the fit has none: turn it off and render the reference again.": "Freestyle zeichnet Linien in das Bild von Cycles; die Anpassung hat keine: ausschalten und die Referenz neu rendern.",
     "Compositing nodes are left out: a reference that went through them holds more than the render.": "Compositing-Nodes werden weggelassen: eine Referenz, die durch sie ging, enthält mehr als das Rendering.",
     "World '{}' has colours beyond linear Rec.709, in which the fit counts: they are taken at its edge.": "Welt '{}' hat Farben außerhalb von linearem Rec.709, in dem die Anpassung rechnet: sie werden an dessen Rand genommen.",
     "Light '{}' has a colour beyond linear Rec.709, in which the fit counts: it is at its edge.": "Licht '{}' hat eine Farbe außerhalb von linearem Rec.709, in dem die Anpassung rechnet: sie ist an dessen Rand.",
