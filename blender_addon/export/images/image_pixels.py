@@ -15,7 +15,7 @@ from .color_space import srgb_to_linear, to_rec709
 
 LINEAR_NAMES = ("Linear Rec.709", "Linear", "scene_linear")
 SRGB_NAMES = ("sRGB",)
-MISSING = (1.0, 0.0, 1.0)  # Cycles' IMAGE_MISSING_RGBA, in its working space; alpha is 1
+MAGENTA = (1.0, 0.0, 1.0)  # Cycles' IMAGE_MISSING_RGBA, in its working space; alpha is 1
 
 
 _only_looking = False
@@ -37,7 +37,7 @@ def without_pixels() -> Iterator[None]:
 
 
 def is_missing(image: bpy.types.Image | None) -> bool:
-    """Whether Cycles has no pixels for a picture, and shows `MISSING` at any coordinate that is not clipped."""
+    """Whether Cycles has no pixels for a picture, and shows `MAGENTA` at any coordinate that is not clipped."""
     if image is None:
         return True
     if image.source == "TILED":  # has no size before it is rendered
