@@ -189,7 +189,7 @@ def _factors(target: TargetShader) -> list[Factor]:
 def _is_in_colors(target: TargetShader, factor: Factor) -> bool:
     """Whether each leaf that a factor leads to shows its share and a free colour as their product alone.
 
-    Then the colours make up for any factor, and no picture tells them apart.
+    Then the colours, up to white, make up for the factor, and no picture tells them apart.
     """
     leaves = [
         leaf

@@ -94,6 +94,10 @@ class RecordedRenderer:
         """See `Renderer`."""
         return self._mask
 
+    def otherwise_mask(self) -> NDArray[np.bool_]:
+        """See `Renderer`."""
+        return np.zeros_like(self._mask)
+
     def image(self, vector: Vector, *, seed: int, spp: int) -> Pixels:
         """See `Renderer`; seed and samples are those of the recording."""
         self.counter.add(1.0)

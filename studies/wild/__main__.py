@@ -3,12 +3,14 @@
 
     python -m studies.wild read FOLDER --rows read.jsonl [--files N]
     python -m studies.wild recover FOLDER --read read.jsonl --rows recover.jsonl [--fits N] [--size 96] [--samples 64]
+        [--seed 20] [--inside]
     python -m studies.wild table --read read.jsonl [--rows recover.jsonl] [--doc FILE]
 
 FOLDER has the files, the first folder below it naming the author (`studies/wild/sources.txt` lists public repositories
 that hold some). Rows that are there are skipped, so a run that was stopped goes on. `recover` renders a material by
-Cycles as the reference, gives its unlinked values others, runs `mfo blend --apply` and renders the saved file; FLIP is
-taken over the target's pixels by `mfo judge`. Materials are taken in turn from the authors.
+Cycles as the reference, gives its unlinked values others (`--inside`: those inside nodes, too), runs
+`mfo blend --apply` and renders the saved file; FLIP is taken over the target's pixels by `mfo judge`. Materials are
+taken in turn from the authors.
 """
 
 from __future__ import annotations
@@ -27,7 +29,7 @@ from typing import Any
 from .rows import Row, add_row, how_read, read_rows, reading_table, recovery_table
 
 READ_SECONDS, RENDER_SECONDS, FIT_SECONDS = 120.0, 300.0, 300.0  # of one child process; more is a row that says so
-SEED = 20  # of the order of materials and of their starts
+SEED = 20  # of the order of materials and of their starts, where no other is chosen
 
 
 class ChildError(Exception):
@@ -76,14 +78,14 @@ def read_files(chosen: argparse.Namespace) -> None:
 def recover_materials(chosen: argparse.Namespace) -> None:
     """One row a material, the authors in turn."""
     known = {(row["file"], row["material"]) for row in read_rows(chosen.rows)}
-    for material in in_turn(read_rows(chosen.read))[: chosen.fits]:
+    for material in in_turn(read_rows(chosen.read), chosen.seed)[: chosen.fits]:
         if (material["file"], material["material"]) not in known:
             add_row(chosen.rows, recover(chosen, material))
 
 
-def in_turn(rows: list[Row]) -> list[Row]:
+def in_turn(rows: list[Row], seed: int = SEED) -> list[Row]:
     """Materials that are no bare emission, one of each author after the other, in an order drawn once."""
-    draw = random.Random(SEED)
+    draw = random.Random(seed)
     authors: dict[str, list[Row]] = {}
     for row in rows:
         for material in row.get("materials", ()):
@@ -102,8 +104,8 @@ def recover(chosen: argparse.Namespace, material: Row) -> Row:
     job, fitted, target = folder / "job", folder / "fitted.blend", f"--object={material['object']}"
     blender, samples = "studies.wild.in_blender", f"--samples={chosen.samples}"
     try:
-        prepare = [str(chosen.folder / material["file"]), target, f"--slot={material['slot']}", f"--seed={SEED}"]
-        prepare.append(f"--view={material['view']}")
+        prepare = [str(chosen.folder / material["file"]), target, f"--slot={material['slot']}"]
+        prepare += [f"--seed={chosen.seed}", f"--view={material['view']}", *(["--inside"] if chosen.inside else [])]
         child([blender, "prepare", *prepare, f"--out={folder}", f"--size={chosen.size}", samples], RENDER_SECONDS)
         began = time.monotonic()
         fit = [f"{folder}/start.blend", target, f"--reference={folder}/reference.exr", f"--out={job}"]
@@ -160,6 +162,8 @@ def main() -> None:
     command.add_argument("--fits", type=int, default=40)
     command.add_argument("--size", type=int, default=96)
     command.add_argument("--samples", type=int, default=64)
+    command.add_argument("--seed", type=int, default=SEED)
+    command.add_argument("--inside", action="store_true")
     command.set_defaults(run=recover_materials)
     command = commands.add_parser("table")
     command.add_argument("--read", type=Path, required=True)

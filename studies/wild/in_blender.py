@@ -2,7 +2,8 @@
 """Blender's part of the study: what the export says of each material of a file, and a recovery prepared from it.
 
     python -m studies.wild.in_blender read FILE
-    python -m studies.wild.in_blender prepare FILE --object NAME --slot N --view N --seed N --out DIR [--size 96]
+    python -m studies.wild.in_blender prepare FILE --object NAME --slot N --view N --seed N --out DIR
+        [--size 96] [--inside]
     python -m studies.wild.in_blender render FILE --out EXR --seed N [--samples 64]
 
 Needs bpy. The answer is the last line of stdout, one JSON object.
@@ -79,7 +80,8 @@ def prepare(chosen: argparse.Namespace) -> dict[str, Any]:
     chosen.out.mkdir(parents=True, exist_ok=True)
     for name, seed in (("reference", 0), ("floor", 1)):
         _render(scene, chosen.out / f"{name}.exr", chosen.samples, seed)
-    moved = _move_values(material, random.Random(chosen.seed))
+    draw = random.Random(chosen.seed)
+    moved = _move_values(material, draw) + (_move_inside(material, draw) if chosen.inside else [])
     _render(scene, chosen.out / "before.exr", chosen.samples, 2)
     bpy.ops.wm.save_as_mainfile(filepath=str(chosen.out / "start.blend"), copy=True, relative_remap=True)
     return {"moved": moved}
@@ -187,6 +189,32 @@ def _move_values(material: bpy.types.Material, draw: random.Random) -> list[str]
     return moved
 
 
+def _move_inside(material: bpy.types.Material, draw: random.Random) -> list[str]:
+    """Give factors of mixes, a stop of each ramp, strengths of bumps and RGB nodes other values; returns which."""
+    moved = []
+    for node in material.node_tree.nodes if material.node_tree else ():
+        kind = node.bl_idname.removeprefix("ShaderNode")
+        if kind in ("MixShader", "MixRGB", "Mix"):
+            factor = node.inputs[0]
+            if factor.type != "VALUE" or factor.is_linked or not 0.0 < factor.default_value < 1.0:
+                continue
+            factor.default_value = draw.uniform(0.2, 0.8)
+        elif kind == "ValToRGB":
+            stop = draw.choice(list(node.color_ramp.elements))
+            stop.color = [*(min(c * draw.uniform(0.6, 1.4) + draw.uniform(0.0, 0.1), 1.0) for c in stop.color[:3]), 1.0]
+        elif kind in ("Bump", "NormalMap"):
+            strength = node.inputs["Strength"]
+            if strength.is_linked:
+                continue
+            strength.default_value = min(strength.default_value * draw.uniform(0.4, 1.3), 1.0)
+        elif kind == "RGB":
+            node.outputs[0].default_value = [*(draw.uniform(0.1, 0.9) for _ in range(3)), 1.0]
+        else:
+            continue
+        moved.append(f"{node.name} (inside)")
+    return moved
+
+
 def _render(scene: bpy.types.Scene, out: Path, samples: int, seed: int) -> None:
     scene.render.engine = "CYCLES"
     cycles, settings = scene.cycles, scene.render.image_settings
@@ -212,6 +240,7 @@ def main() -> None:
     parser.add_argument("--seed", type=int, default=0)
     parser.add_argument("--size", type=int, default=96)
     parser.add_argument("--samples", type=int, default=64)
+    parser.add_argument("--inside", action="store_true")
     parser.add_argument("--out", type=Path, default=Path())
     chosen = parser.parse_args()
     answer = {"read": lambda: read(chosen.file), "prepare": lambda: prepare(chosen), "render": lambda: render(chosen)}

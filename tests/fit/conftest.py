@@ -74,6 +74,9 @@ class SphereRenderer:
     def target_mask(self) -> NDArray[np.bool_]:
         return self._inside
 
+    def otherwise_mask(self) -> NDArray[np.bool_]:
+        return np.zeros_like(self._inside)
+
     def reference(self, truth: NDArray[np.float64]) -> Image:
         return Image(self.shade(truth).astype(np.float32), Encoding.LINEAR)
 

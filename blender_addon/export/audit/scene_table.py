@@ -97,7 +97,10 @@ RENDER = Owner(
     "use_stamp_lens use_stamp_marker use_stamp_memory use_stamp_note use_stamp_render_time use_stamp_scene "
     "use_stamp_sequencer_strip use_stamp_time views views_format sequencer_gl_preview",
     named={
-        "use_freestyle": Named(False, "Freestyle draws lines into Cycles' picture; the fit has none."),
+        "use_freestyle": Named(
+            False,
+            "Freestyle draws lines into Cycles' picture; the fit has none: turn it off and render the reference again.",
+        ),
         "use_stamp": Named(False, "Burn Into Image writes text into the picture; the fit has none."),
     },
 )

@@ -5,6 +5,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from contextlib import contextmanager
+from pathlib import Path
 
 import bpy
 import numpy as np
@@ -14,6 +15,7 @@ from .color_space import srgb_to_linear, to_rec709
 
 LINEAR_NAMES = ("Linear Rec.709", "Linear", "scene_linear")
 SRGB_NAMES = ("sRGB",)
+MAGENTA = (1.0, 0.0, 1.0)  # Cycles' IMAGE_MISSING_RGBA, in its working space; alpha is 1
 
 
 _only_looking = False
@@ -32,6 +34,17 @@ def without_pixels() -> Iterator[None]:
         yield
     finally:
         _only_looking = before
+
+
+def is_missing(image: bpy.types.Image | None) -> bool:
+    """Whether Cycles has no pixels for a picture, and shows `MAGENTA` at any coordinate that is not clipped."""
+    if image is None:
+        return True
+    if image.source == "TILED":  # has no size before it is rendered
+        return False
+    if image.source in ("SEQUENCE", "MOVIE"):  # has pixels at the frames that were shown
+        return not image.packed_files and not Path(bpy.path.abspath(image.filepath, library=image.library)).exists()
+    return not image.has_data and not image.packed_file and not any(image.size)
 
 
 def is_data(image: bpy.types.Image) -> bool:

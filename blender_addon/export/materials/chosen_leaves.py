@@ -64,8 +64,8 @@ def chosen_mix_values(
     left = [value.name for value in values if by_all and value.factor is not None and not value.by_default]
     if left:
         findings.note(
-            f"{', '.join(left)} stays as it is: the colours of its shaders make up for any. Name it among the values "
-            "to have it fitted, with those colours held.",
+            f"{', '.join(left)} stays as it is: the colours of its shaders make up for it, up to white. Name "
+            "it among the values to have it fitted, with those colours held.",
             explains=False,
         )
     return [value for value in values if (value.by_default if by_all else value.name in names)]

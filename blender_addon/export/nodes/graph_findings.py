@@ -5,12 +5,12 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
-from pathlib import Path
 
 import bpy
 
 from ...versions import active_output
 from ..findings import Findings
+from ..images.image_pixels import is_missing
 from .shader_graph import Links
 
 GROUP, GROUP_INPUT = "ShaderNodeGroup", "NodeGroupInput"
@@ -119,7 +119,7 @@ def note_missing_pictures(owner: str, tree: bpy.types.NodeTree | None, findings:
     """Name pictures without pixels that feed the output of a material or world, which Cycles shows as magenta."""
     output = active_output(tree)
     for node in _nodes_before(output.inputs) if output is not None else ():
-        if node.bl_idname not in PICTURES or not _is_missing(node.image):
+        if node.bl_idname not in PICTURES or not is_missing(node.image):
             continue
         named = "image" if node.image is None else f"image '{node.image.name}'"
         findings.note(
@@ -149,16 +149,6 @@ def note_few_samples(material: str, tree: bpy.types.NodeTree | None, findings: F
                 f"the node '{node.name}', and the fit has their mean. Set its Samples to {STEADY_BEVEL}, and render "
                 "the reference anew."
             )
-
-
-def _is_missing(image: bpy.types.Image | None) -> bool:
-    if image is None:
-        return True
-    if image.source == "TILED":  # has no size before it is rendered
-        return False
-    if image.source in ("SEQUENCE", "MOVIE"):  # has pixels at the frames that were shown
-        return not image.packed_files and not Path(bpy.path.abspath(image.filepath, library=image.library)).exists()
-    return not image.has_data and not image.packed_file and not any(image.size)
 
 
 def _nodes_before(sockets: Iterable[bpy.types.NodeSocket]) -> Iterator[bpy.types.Node]:

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from ...versions import active_output
 from ..images.color_space import to_rec709
 from ..images.image_filter import filtered_pixels
-from ..images.image_pixels import UnreadableImageError
+from ..images.image_pixels import MAGENTA, UnreadableImageError, is_missing
 from ..material_model import Socket, Texture
 from .merged_nodes import is_alpha_read
 
@@ -190,6 +190,8 @@ def _evaluate(output: bpy.types.NodeSocket, way: _Way) -> Texture | NDArray[np.f
         return np.array([output.default_value], dtype=np.float64)
     if kind == "ShaderNodeRGB":
         return to_rec709(list(output.default_value)[:3])
+    if kind == "ShaderNodeTexImage" and is_missing(node.image) and node.extension in WRAPS:
+        return np.ones(1) if output.name == "Alpha" else to_rec709(list(MAGENTA))
     if kind == "ShaderNodeTexImage":
         return _image(node, output.name, bends=way.bends)
     if kind == "ShaderNodeGamma":

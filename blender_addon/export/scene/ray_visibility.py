@@ -48,11 +48,16 @@ def hidden_from(instance: bpy.types.DepsgraphObjectInstance) -> tuple[str, ...]:
     return tuple(kind for kind in kinds if not all(getattr(each, f"visible_{kind}") for each in owners))
 
 
+def is_cut(instance: bpy.types.DepsgraphObjectInstance) -> bool:
+    """Whether pictures show no surface where an instance is, but what is behind it or nothing."""
+    return any(each.is_holdout or each.is_shadow_catcher for each in (instance.object, shown_by(instance)))
+
+
 def note_visibility(
     instance: bpy.types.DepsgraphObjectInstance, findings: Findings, *, is_fitted: bool = False
 ) -> None:
     """Name what of an instance is left out; of one that is fitted some of that is an error."""
-    item, parent = instance.object, shown_by(instance)
+    item = instance.object
     name_settings(OBJECT_CYCLES, cycles_settings(item), item.name, findings)
     if any(divides_adaptively(modifier, item) for modifier in item.modifiers):
         findings.note(
@@ -61,13 +66,12 @@ def note_visibility(
     for system in item.particle_systems:
         if system.settings.type == "HAIR" and system.settings.render_type == "PATH":
             findings.note(f"The hair '{system.name}' of '{item.name}' is left out.")
-    is_cut = any(each.is_holdout or each.is_shadow_catcher for each in (item, parent))
-    if is_cut and is_fitted:
+    if is_cut(instance) and is_fitted:
         findings.error(
             f"Object '{item.name}' is a holdout or shadow catcher, so pictures do not show its material: turn that off "
             "in Object Properties > Visibility."
         )
-    elif is_cut:
+    elif is_cut(instance):
         findings.note(f"Object '{item.name}' is a holdout or shadow catcher; in the fit it is an object.")
 
 
@@ -108,8 +112,8 @@ def put_looks(
             f"Material '{name}' is another to the camera (Light Path): before the target the fit has it as diffuse "
             "rays see it."
         )
-        return
-    data.shapes[:] = [replace(s, camera_hidden=True) if s.identifier in shapes else s for s in data.shapes]
+    how = {"camera_hidden" if data.materials[looks["camera"]].model == "null" else "seen_otherwise": True}
+    data.shapes[:] = [replace(s, **how) if s.identifier in shapes else s for s in data.shapes]
 
 
 def hide_from_rays(data: SceneData, findings: Findings) -> None:

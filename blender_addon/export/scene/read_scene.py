@@ -53,6 +53,7 @@ from .ray_visibility import (
     camera_misses,
     hidden_from,
     hide_from_rays,
+    is_cut,
     note_hidden,
     note_visibility,
     shadow_transmission,
@@ -351,8 +352,8 @@ class _Walk:
                 self._note_generated(item, slot)
                 if self.bakes is not None:
                     bsdf = self.bakes.ask_surface(self.data, name, Surface(instance, slot, piece), self.findings)
-            linked = linked_light(item)
-            self.data.shapes.append(Shape(name, NOT_PLACED, bsdf, terminator, shadow, hidden, body, linked, rays))
+            linked, cut = linked_light(item), is_cut(instance)
+            self.data.shapes.append(Shape(name, NOT_PLACED, bsdf, terminator, shadow, hidden, body, linked, rays, cut))
 
     def _body(self, bsdfs: dict[int, str]) -> int:
         """The number of an object of several shapes that light goes through below the surface, else 0."""

@@ -51,7 +51,8 @@ class Shape:
     `shadow_transmission` is what shadow rays keep at its surface, None where that follows from its alpha. Where
     `camera_hidden` rays of the camera pass it as if it were not there. Shapes of one `body`, above 0, are one object
     below the surface. `linked` is the object's name where the light it gives is linked to some objects. Rays may pass
-    what is `hidden` from them.
+    what is `hidden` from them. What is `seen_otherwise` Cycles shows the camera as something else, as
+    a shadow catcher.
     """
 
     identifier: str
@@ -63,6 +64,7 @@ class Shape:
     body: int = 0
     linked: str = ""
     hidden: Hidden = Hidden()
+    seen_otherwise: bool = False
 
 
 @dataclass(frozen=True)

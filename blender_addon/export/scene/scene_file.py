@@ -213,12 +213,14 @@ def _shape_element(shape: Shape, scene: SceneData, files: SceneFiles) -> Element
 
 
 def _numbers(shape: Shape) -> list[Element]:
-    """What the backend's transport reads: `smooth_facets`, `shadow_rays`, `camera_view`, `subsurface_walks`."""
+    """What the backend's transport reads (`smooth_facets`, `shadow_rays`, `camera_view`, `subsurface_walks`) and what a
+    verdict leaves out (`seen_through`)."""
     numbers = {
         "shadow_geometry_offset": shape.terminator.geometry_offset or None,
         "shadow_shading_offset": shape.terminator.shading_offset or None,
         "shadow_transmission": shape.shadow_transmission,
         "camera_hidden": 1.0 if shape.camera_hidden else None,
+        "seen_otherwise": 1.0 if shape.seen_otherwise else None,
         "body": float(shape.body) if shape.body else None,
         "leaning_normals": 1.0 if normals_lean(shape.mesh) else None,
     }

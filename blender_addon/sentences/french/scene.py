@@ -62,7 +62,7 @@ SCENE = {
     "Camera Cull is on: Cycles leaves objects outside the frame out; the fit has them.": "Camera Cull est actif : Cycles omet les objets hors du cadre ; l'ajustement les a.",
     "Distance Cull is on: Cycles leaves distant objects out; the fit has them.": "Distance Cull est actif : Cycles omet les objets lointains ; l'ajustement les a.",
     "Burn Into Image writes text into the picture; the fit has none.": "Incruster dans l'image écrit du texte dans l'image ; l'ajustement n'en a pas.",
-    "Freestyle draws lines into Cycles' picture; the fit has none.": "Freestyle trace des lignes dans l'image de Cycles ; l'ajustement n'en a pas.",
+    "Freestyle draws lines into Cycles' picture; the fit has none: turn it off and render the reference again.": "Freestyle trace des lignes dans l'image de Cycles ; l'ajustement n'en a pas : le désactiver et refaire le rendu de la référence.",
     "Compositing nodes are left out: a reference that went through them holds more than the render.": "Les nœuds de compositing sont omis : une référence qui y est passée contient plus que le rendu.",
     "World '{}' has colours beyond linear Rec.709, in which the fit counts: they are taken at its edge.": "Le monde '{}' a des couleurs hors de Rec.709 linéaire, dans lequel l'ajustement calcule : elles sont prises à sa limite.",
     "Light '{}' has a colour beyond linear Rec.709, in which the fit counts: it is at its edge.": "La lumière '{}' a une couleur hors de Rec.709 linéaire, dans lequel l'ajustement calcule : elle est à sa limite.",
@@ -219,7 +219,7 @@ SCENE = {
     "{} is fitted with the model blender_principled alone: choose that.": "{} n'est ajusté qu'avec le modèle blender_principled : le choisir.",
     "{} of material '{}' is linked to {}, which cannot be exported; the socket's own value is used.": "{} du matériau '{}' est lié à {}, qui ne peut pas être exporté ; la valeur propre de l'entrée est utilisée.",
     "{} of material '{}' is linked to {}: mend or unlink it.": "{} du matériau '{}' est lié à {} : le réparer ou le délier.",
-    "{} stays as it is: the colours of its shaders make up for any. Name it among the values to have it fitted, with those colours held.": "{} reste tel quel : les couleurs de ses shaders en compensent tout. Le nommer parmi les valeurs pour l'ajuster, ces couleurs gardées.",
+    "{} stays as it is: the colours of its shaders make up for it, up to white. Name it among the values to have it fitted, with those colours held.": "{} reste tel quel : les couleurs de ses shaders le compensent, jusqu'au blanc. Le nommer parmi les valeurs pour l'ajuster, ces couleurs gardées.",
     "{}: the {} of the node '{}' is missing; it is magenta, as in Cycles. If the reference shows it, find it first: File > External Data > Find Missing Files.": "{} : {} du nœud '{}' manque ; c'est magenta, comme dans Cycles. Si la référence le montre, le chercher d'abord : Fichier > Données externes > Trouver les fichiers manquants.",
     # pictures
     "All pictures are left out: leave one in at least.": "Toutes les images sont omises : en laisser au moins une.",

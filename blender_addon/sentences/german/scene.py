@@ -63,7 +63,7 @@ SCENE = {
     "Camera Cull is on: Cycles leaves objects outside the frame out; the fit has them.": "Camera Cull ist an: Cycles lässt Objekte außerhalb des Bildes weg; die Anpassung hat sie.",
     "Distance Cull is on: Cycles leaves distant objects out; the fit has them.": "Distance Cull ist an: Cycles lässt ferne Objekte weg; die Anpassung hat sie.",
     "Burn Into Image writes text into the picture; the fit has none.": "Ins Bild einbrennen schreibt Text ins Bild; die Anpassung hat keinen.",
-    "Freestyle draws lines into Cycles' picture; the fit has none.": "Freestyle zeichnet Linien in das Bild von Cycles; die Anpassung hat keine.",
+    "Freestyle draws lines into Cycles' picture; the fit has none: turn it off and render the reference again.": "Freestyle zeichnet Linien in das Bild von Cycles; die Anpassung hat keine: ausschalten und die Referenz neu rendern.",
     "Compositing nodes are left out: a reference that went through them holds more than the render.": "Compositing-Nodes werden weggelassen: eine Referenz, die durch sie ging, enthält mehr als das Rendering.",
     "World '{}' has colours beyond linear Rec.709, in which the fit counts: they are taken at its edge.": "Welt '{}' hat Farben außerhalb von linearem Rec.709, in dem die Anpassung rechnet: sie werden an dessen Rand genommen.",
     "Light '{}' has a colour beyond linear Rec.709, in which the fit counts: it is at its edge.": "Licht '{}' hat eine Farbe außerhalb von linearem Rec.709, in dem die Anpassung rechnet: sie ist an dessen Rand.",
@@ -220,7 +220,7 @@ SCENE = {
     "{} is fitted with the model blender_principled alone: choose that.": "{} wird nur mit dem Modell blender_principled angepasst: dieses wählen.",
     "{} of material '{}' is linked to {}, which cannot be exported; the socket's own value is used.": "{} von Material '{}' ist verbunden mit: {}. Das kann nicht exportiert werden; der eigene Wert des Eingangs wird verwendet.",
     "{} of material '{}' is linked to {}: mend or unlink it.": "{} von Material '{}' ist verbunden mit: {}. Das richten oder die Verbindung lösen.",
-    "{} stays as it is: the colours of its shaders make up for any. Name it among the values to have it fitted, with those colours held.": "{} bleibt, wie es ist: die Farben seiner Shader gleichen jedes aus. Es unter den Werten nennen, um es bei festen Farben anzupassen.",
+    "{} stays as it is: the colours of its shaders make up for it, up to white. Name it among the values to have it fitted, with those colours held.": "{} bleibt, wie es ist: die Farben seiner Shader gleichen es aus, bis hin zu Weiß. Es unter den Werten nennen, um es bei festen Farben anzupassen.",
     "{}: the {} of the node '{}' is missing; it is magenta, as in Cycles. If the reference shows it, find it first: File > External Data > Find Missing Files.": "{}: {} des Nodes '{}' fehlt und ist magenta, wie in Cycles. Zeigt es die Referenz, es erst suchen: Datei > Externe Daten > Fehlende Dateien suchen.",
     # pictures
     "All pictures are left out: leave one in at least.": "Alle Bilder sind weggelassen: mindestens eines verwenden.",

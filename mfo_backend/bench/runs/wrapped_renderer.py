@@ -35,6 +35,10 @@ class WrappedRenderer:
         """See `Renderer.target_mask`."""
         return self._renderer.target_mask()
 
+    def otherwise_mask(self) -> NDArray[np.bool_]:
+        """See `Renderer.otherwise_mask`."""
+        return self._renderer.otherwise_mask()
+
 
 class NewSeeds(WrappedRenderer):
     """Ignores the seed it is given: what common random numbers are worth."""

@@ -43,8 +43,13 @@ class TaskJudge:
         return {name: (mean(name, 0), mean(name, 1)) for name in each[0]}
 
     def judged(self, result: FitResult, others: NDArray[np.bool_] | None = None) -> tuple[FitResult, Pixels]:
-        """The result with its verdict, and its picture; see `judge.judged_result`."""
-        task = self.task
+        """The result with its verdict, and its picture; see `judge.judged_result`.
+
+        What the camera sees otherwise in Cycles is not among the surroundings either.
+        """
+        task, otherwise = self.task, self.task.renderer.otherwise_mask()
+        if otherwise.any():
+            others = otherwise if others is None else others | otherwise
         return judged_result(
             result, task.reference, self.start, self.end, task.mask, task.view, noted=task.noted, others=others,
             judge_all=None if task.sheet is None else partial(self._results, task.sheet, others),

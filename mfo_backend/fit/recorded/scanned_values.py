@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from ...material.principled.principled_dict import DIRECTIONS
 from ..tolerances import DIM_FLOOR
 from .recording import Recording, Setting, Vector
-from .where_to_look import fewer_groups
+from .where_to_look import all_groups, fewer_groups
 
 # Neighbours are 6 % apart in a range of a factor of 16; the basin of a noise's scale is 4 to 5 % wide to both sides
 TRIED_SCALES = 48
@@ -39,8 +39,8 @@ def best_scanned(setting: Setting, recording: Recording) -> list[Placed]:
     if graph is None or not graph.scanned:
         return [{}]
     first = setting.table.length - graph.table.length
-    groups = recording.paths.pixel_groups(recording.paths.interior)
-    groups = fewer_groups(groups, setting.calm, setting.plan.start_lanes)
+    # a chain thinner than a pixel has none without background
+    groups = fewer_groups(all_groups(recording.paths, 1), setting.calm, setting.plan.start_lanes)
     reference = groups.average(setting.calm)
     image = setting.scene.images_of(recording.paths, groups, setting.user)
     dark = None

@@ -15,11 +15,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ...fit.tolerances import DETERMINED_BELOW, WEAK_BELOW
 from ...material.principled.blender_selection import AMOUNT_OF, PLAIN
 from ...material.principled.principled_dict import socket_value
 from ...material.principled.principled_parameters import BLENDER_PRINCIPLED, PARAMETER_OF_SOCKET, SOCKET_OF_PARAMETER
 from ...metrics.display.tone_mapping import View
-from ...types.certainty import Level
+from ...types.certainty import Certainty, Level
 from ...types.image import Encoding, Image
 from ...types.parameter import Parameter, ParameterTable, Value
 from ...types.result import FitResult
@@ -216,11 +217,20 @@ def with_values_of(other: MaterialClass, result: FitResult, material: Mapping[st
         peak = max(float(color.max()), 1e-6)
         values |= {"emission_color": tuple(float(c) for c in color / peak), "emission_strength": strength * peak}
         if (sure := certainty.get("emission_color")) is not None:
-            certainty["emission_color"] = replace(sure, sd=tuple(sd / peak for sd in sure.sd))
+            certainty["emission_color"] = _brighter(sure, peak)
             certainty["emission_strength"] = replace(sure, sd=(strength * max(sure.sd),))
     own = [BLENDER_PRINCIPLED[name] for name in values if name in SOCKET_OF_PARAMETER]
     bounds = {p.name: (p.lower, p.upper) for p in own}
     return replace(result, recovered=values, certainty=certainty, bounds=bounds | dict(result.bounds))
+
+
+def _brighter(sure: Certainty, peak: float) -> Certainty:
+    """How sure the colour of a glow is that was `peak` at its brightest, and is 1: next to none has no sure colour."""
+    sd = tuple(deviation / peak for deviation in sure.sd)
+    if max(sd) >= WEAK_BELOW:
+        return replace(sure, sd=sd, level=Level.NOT_TOLD_APART)
+    is_less = max(sd) >= DETERMINED_BELOW and sure.level is not Level.NOT_TOLD_APART
+    return replace(sure, sd=sd, level=Level.WEAK if is_less else sure.level)
 
 
 def doubted(result: FitResult, other: FitResult, material: Mapping[str, Any]) -> FitResult:

@@ -37,6 +37,9 @@ DENSITY = "absorption_density"
 STRENGTH = "emission_strength"
 GLOW = {"emission_color", STRENGTH}
 WALK_SIZES, LEAST_SIZE = ("subsurface_radius", "subsurface_scale"), 1e-4
+# Of refraction, any number above 0 in Blender: a bubble's in water is below 1, and a canopy had 3.3
+INDICES = ("ior", "coat_ior", "thin_film_ior")
+LEAST_INDEX = 0.1  # every ray but a straight one is mirrored. No measurement
 SOCKETS = frozenset(PARAMETER_OF_SOCKET)
 _VERSION = (5, 0)  # of a job that does not say which Blender it comes from
 
@@ -115,22 +118,31 @@ def _opened(target: Target, selection: str | Sequence[str], materials: Materials
     nothing = not isinstance(selection, str) and not selection
     chosen = None if nothing else select_blender_parameters(selection, present=shown.difference(held), linked=linked)
     table = ParameterTable(()) if chosen is None else _labelled(chosen, materials[target.bsdf_id])
-    table = _near_walks(table, _constants(sockets), WALK_SIZES, (STRENGTH,))
+    table = _around_own(table, _constants(sockets), WALK_SIZES, (STRENGTH,))
     start = table.clip(table.pack(_constants(sockets)))
     return target, table, start
 
 
-def _near_walks(
-    table: ParameterTable, values: Mapping[str, Value], sizes: Collection[str], strengths: Collection[str]
+def _around_own(
+    table: ParameterTable,
+    values: Mapping[str, Value],
+    sizes: Collection[str],
+    strengths: Collection[str],
+    indices: Collection[str] = INDICES,
 ) -> ParameterTable:
-    """With bounds of these `sizes` around those in the scene, for which light below the surface is recorded, and of the
-    `strengths` of glows."""
+    """With bounds of these `sizes` around those in the scene, for which light below the surface is recorded, of the
+    `strengths` of glows, and of `indices` that no usual surface has."""
     near = []
     for p in table:
         if p.name == DENSITY and values.get(DENSITY):
             p = replace(p, upper=float(np.ravel(values[DENSITY])[0]) * WALKS_NEAR)
         if p.name in strengths:
             p = replace(p, upper=(float(np.ravel(values.get(p.name, 0.0))[0]) or 1.0) * WALKS_NEAR)
+        if p.name in indices:
+            index = float(np.ravel(values.get(p.name, p.default))[0])
+            if index < 1.0:  # which has no gradient, so that neither side leads to the other
+                p = replace(p, lower=max(min(1.0 / p.upper, index), LEAST_INDEX), upper=1.0 / p.lower)
+            p = replace(p, upper=max(p.upper, index))
         if p.name in sizes:
             present = np.maximum(np.ravel(values.get(p.name, p.default)), LEAST_SIZE)
             begin = tuple(float(v) for v in present) if p.size == 3 else float(present[0])
@@ -186,8 +198,9 @@ def _prepared(
     key_ends = {name: f"{of_fitted}{name}" for name in table.names}
     if mix is not None:
         named = [(name, shown) for names in mix.leaves.values() for name, shown in names.items()]
-        sizes, strengths = ([s for name, s in named if name in kind] for kind in (WALK_SIZES, (STRENGTH,)))
-        others = _near_walks(ParameterTable(mix.parameters), mix.start, sizes, strengths)
+        kinds = (WALK_SIZES, (STRENGTH,), INDICES)
+        sizes, strengths, indices = ([shown for name, shown in named if name in kind] for kind in kinds)
+        others = _around_own(ParameterTable(mix.parameters), mix.start, sizes, strengths, indices)
         start = np.concatenate([start, others.clip(others.pack(mix.start))])
         table, key_ends = ParameterTable([*table, *others]), key_ends | mix.key_ends
     outer_target = Target(target.shape_id, target.bsdf_id, outer, outer)

@@ -99,5 +99,9 @@ class InterruptibleRenderer:
         """See `Renderer.target_mask`."""
         return self._call(self._renderer.target_mask)
 
+    def otherwise_mask(self) -> NDArray[np.bool_]:
+        """See `Renderer.otherwise_mask`."""
+        return self._call(self._renderer.otherwise_mask)
+
     def _call(self, function: Callable[[], T]) -> T:
         return self._thread.call(function)

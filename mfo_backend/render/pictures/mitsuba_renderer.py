@@ -169,6 +169,12 @@ class MitsubaRenderer:
         """See `Renderer.target_mask`: a regular grid of rays in every pixel, without the pixel filter's tails."""
         return self._seen[0].copy()
 
+    def otherwise_mask(self) -> NDArray[np.bool_]:
+        """See `Renderer.otherwise_mask`, by the same rays."""
+        from ..camera.seen_through import otherwise_pixels
+
+        return otherwise_pixels(self._scene, self._sensor)
+
     @property
     def is_behind_glass(self) -> bool:
         """Whether the camera sees the target through others alone; the mask is then where it does."""

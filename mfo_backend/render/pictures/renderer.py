@@ -46,6 +46,10 @@ class Renderer(Protocol):
         """Pixels (height, width) whose footprint sees the target directly."""
         ...
 
+    def otherwise_mask(self) -> NDArray[np.bool_]:
+        """Pixels (height, width) whose footprint sees what Cycles shows otherwise, as a holdout."""
+        ...
+
 
 def load_renderer(
     scene_xml: Path,

@@ -93,6 +93,10 @@ class SheetRenderer:
         """See `Renderer.target_mask`."""
         return self.sheet.put([r.target_mask() for r in self.renderers])
 
+    def otherwise_mask(self) -> NDArray[np.bool_]:
+        """See `Renderer.otherwise_mask`."""
+        return self.sheet.put([r.otherwise_mask() for r in self.renderers])
+
 
 def seed_of(seed: int, number: int) -> int:
     """The seed of one of the pictures, counted from 0."""

@@ -108,6 +108,59 @@ def test_a_target_whose_material_no_picture_shows_is_refused(
         export(item)
 
 
+def glow_to_the_camera(material: Any) -> None:
+    """Let a material glow to rays of the camera alone, as a backdrop may."""
+    nodes, links = material.node_tree.nodes, material.node_tree.links
+    mix, glow, path = (nodes.new(f"ShaderNode{kind}") for kind in ("MixShader", "Emission", "LightPath"))
+    glow.inputs["Color"].default_value = (1.0, 0.0, 1.0, 1.0)
+    links.new(path.outputs["Is Camera Ray"], mix.inputs[0])
+    links.new(nodes["Principled BSDF"].outputs[0], mix.inputs[1])
+    links.new(glow.outputs[0], mix.inputs[2])
+    links.new(mix.outputs[0], material.node_tree.get_output_node("CYCLES").inputs["Surface"])
+
+
+@pytest.mark.parametrize("flag", ["is_holdout", "is_shadow_catcher", "light path"])
+def test_what_the_camera_sees_otherwise_is_none_of_the_surroundings(
+    scene: Any, export: Any, render_cycles: Any, mitsuba: Any, flag: str
+) -> None:
+    """Oracle: Cycles' picture of the truth, whose verdict hung on a green floor that no picture shows."""
+    from mfo_backend.fit.judge.verdict import AROUND_SHARED, judge
+    from mfo_backend.metrics.display.tone_mapping import DisplayView
+    from mfo_backend.types.image import Encoding, Image
+    from mfo_backend.types.verdict import Verdict
+
+    lit_scene(scene)
+    scene.cycles.samples = 256
+    corners = [(-3, -3, -4), (3, -3, -4), (3, 3, -4), (-3, 3, -4)]
+    floor = add_mesh("Floor", corners, [(0, 1, 2, 3)], new_material("Floor", Base_Color=(0.05, 0.4, 0.05)))
+    item = target()
+    # a reference whose surroundings are even counts as cut out
+    post = [(-3, -3, -3.9), (-2, -3, -3.9), (-2, 3, -3.9), (-3, 3, -3.9)]
+    add_mesh("Post", post, [(0, 1, 2, 3)], new_material("Post", Base_Color=(0.7, 0.2, 0.1)))
+    if flag == "light path":
+        glow_to_the_camera(floor.data.materials[0])
+    else:
+        setattr(floor, flag, True)
+    renderer, truth = renderer_and_cycles(export, render_cycles, item)
+    picture, mask = renderer.image(renderer.start, seed=1, spp=256), renderer.target_mask()
+    otherwise = renderer.otherwise_mask()
+    assert otherwise.any()
+    reference = Image(np.ascontiguousarray(truth, np.float32), Encoding.LINEAR)
+    found = judge(reference, picture, mask, DisplayView(), others=otherwise)
+    without = judge(reference, picture, mask, DisplayView())
+    assert found is not None
+    assert without is not None
+    assert found.around is None or found.around.shared_at_least < 0.3 * AROUND_SHARED
+    assert without.around is not None
+    assert without.around.shared_at_least > AROUND_SHARED
+    if flag == "light path":  # pixels of the target's rim have the glow in them, too
+        return
+    assert found.verdict is Verdict.SAME
+    assert without.verdict is Verdict.CLOSE
+    setattr(floor, flag, False)
+    assert not renderer_and_cycles(export, render_cycles, item)[0].otherwise_mask().any()
+
+
 def levels(export: Any, render_cycles: Any, target: Any) -> dict[str, Any]:
     """Means of both routes' pictures within the target over Cycles', RGB, less 1."""
     from mfo_backend.render.paths.recorded_scene import RecordedScene

@@ -8,6 +8,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from mfo_backend.fit.judge import judged_result as judged_results
 from mfo_backend.fit.judge import verdict
 from mfo_backend.fit.judge.beyond_noise import beyond_noise
 from mfo_backend.fit.judge.judged_result import judged_result
@@ -77,6 +78,24 @@ def test_nothing_is_determined_where_the_picture_is_not_matched():
     assert found.message.startswith("The result does not match the reference.")
     assert "converged" not in found.message
     assert words(found)["roughness"] == "doubtful, as the picture is not matched"
+
+
+@pytest.mark.parametrize(
+    ("verdict", "cause", "said"),
+    [
+        (Verdict.SAME, None, "determined"),
+        (Verdict.CLOSE, Cause.NOISE, "determined"),  # nothing differs that is not noise
+        (Verdict.CLOSE, Cause.NOTED, "doubtful, as the picture is not matched"),
+        (Verdict.CLOSE, Cause.SURROUNDINGS, "doubtful, as the picture is not matched"),
+        (Verdict.CLOSE, None, "doubtful, as the picture is not matched"),
+    ],
+)
+def test_values_that_may_make_up_for_what_differs_are_not_determined(monkeypatch, verdict, cause, said):
+    judgement = Judgement(verdict, cause, Difference(0.05, 0.0, 0.02, 0.02, 0.0))
+    monkeypatch.setattr(judged_results, "judge", lambda *_, **__: judgement)
+    found, _ = judged(0.3, 0.005, 0.29)
+    assert words(found)["roughness"] == said
+    assert found.status is Status.CONVERGED
 
 
 def test_a_cancelled_fit_stays_cancelled():

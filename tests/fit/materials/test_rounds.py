@@ -63,6 +63,9 @@ class Wall:
     def target_mask(self) -> np.ndarray:
         return self._mask
 
+    def otherwise_mask(self) -> np.ndarray:
+        return np.zeros_like(self._mask)
+
 
 def light_of(left: np.ndarray, right: np.ndarray) -> np.ndarray:
     """Radiosity of two walls that see half of each other under irradiances of 1 and 0.3."""

@@ -37,12 +37,20 @@ class Fake:
         self.set_up(shown(pattern(scale), (0.8, 0.1, 0.3), (0.1, 0.6, 0.2)), GRAPH, TABLE)
 
     def set_up(self, reference: np.ndarray, values: ParameterTable, table: ParameterTable) -> None:
+        count = len(PLACES)
         groups = SimpleNamespace(
-            average=lambda image: image, lanes_of_groups=np.ones(len(PLACES), int), take=lambda which: groups
+            average=lambda image: image, lanes_of_groups=np.ones(count, int), take=lambda which: groups, lanes=count,
+            pixels=np.arange(count),
+        )  # fmt: skip
+
+        def pixel_groups(keep: np.ndarray | None = None) -> Any:
+            assert keep is None or keep.any(), "Dr.Jit ends the process where it is asked for no pixel"
+            return groups
+
+        paths = SimpleNamespace(
+            pixel_groups=pixel_groups, interior=np.ones(count, bool), lanes=count, pixel=groups.pixels
         )
-        self.recording: Any = SimpleNamespace(
-            paths=SimpleNamespace(pixel_groups=lambda keep: groups, interior=None), setting=None
-        )
+        self.recording: Any = SimpleNamespace(paths=paths, setting=None)
         varying = dict.fromkeys(self.pictures(values.pack({})), (0,))
         plain = lambda vectors: [self.pictures(v) for v in vectors]  # noqa: E731
         graph = SimpleNamespace(scanned=(0,), table=values, varying=varying, plain=plain)
@@ -71,6 +79,13 @@ def test_a_scale_is_found_in_any_colours(scale: float) -> None:
     assert 1.0 / spacing**1.5 < found[0][1] / scale < spacing**1.5
     assert placed(fake.setting.user, found[0])[1] == found[0][1]
     assert fake.setting.user[1] == 4.0
+
+
+def test_a_scale_is_found_on_what_is_thinner_than_a_pixel() -> None:
+    fake = Fake(6.1)
+    fake.recording.paths.interior[:] = False
+    found = best_scanned(fake.setting, fake.recording)
+    assert abs(np.log(found[0][1] / 6.1)) < 1.5 * np.log(16.0) / (TRIED_SCALES - 1)
 
 
 class Bumped(Fake):

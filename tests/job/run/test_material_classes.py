@@ -153,6 +153,28 @@ def test_a_glow_is_written_as_a_full_colour_and_a_strength():
     assert set(found.bounds) == set(found.recovered)
 
 
+@pytest.mark.parametrize(
+    ("peak", "level", "said"),
+    [
+        (0.5, Level.DETERMINED, Level.DETERMINED),
+        (0.5, Level.DOUBTFUL, Level.DOUBTFUL),
+        (0.1, Level.DETERMINED, Level.WEAK),
+        (0.1, Level.DOUBTFUL, Level.WEAK),
+        (0.1, Level.NOT_TOLD_APART, Level.NOT_TOLD_APART),
+        (0.005, Level.DETERMINED, Level.NOT_TOLD_APART),  # next to no glow has no colour
+    ],
+)
+def test_the_colour_of_a_faint_glow_is_not_sure(peak: float, level: Level, said: Level) -> None:
+    """A glow of 0.015 had the colour (1, 0.39, 0) +- 1.3, called determined."""
+    own = material()
+    fit = fitted(0.02).result
+    sure = {"emission_color": Certainty((0.002, 0.004, 0.001), level)}
+    fit = replace(fit, recovered={"emission_color": (0.4 * peak, peak, 0.2 * peak)}, certainty=sure)
+    found = with_values_of(named("glowing", own), fit, own).certainty["emission_color"]
+    assert found.sd == pytest.approx((0.002 / peak, 0.004 / peak, 0.001 / peak))
+    assert found.level is said
+
+
 def test_of_a_glow_whose_colour_nodes_give_the_strength_is_sought():
     own = material(Emission_Color=[0.1, 0.5, 0.25])
     own["sockets"]["Emission Color"]["linked"] = True

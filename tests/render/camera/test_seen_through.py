@@ -44,6 +44,27 @@ def circle(radius: float) -> np.ndarray:
     return np.hypot(*np.meshgrid(along, along)) < radius
 
 
+def test_pixels_of_what_is_seen_otherwise_but_for_what_is_before_it() -> None:
+    """A catcher of radius 0.5, the middle of which is behind a plate, in a frame of 2 x 2 from straight above."""
+    from mfo_backend.render.camera.seen_through import otherwise_pixels
+
+    plain = {"type": "twosided", "bsdf": {"type": "diffuse"}}
+    film = {"type": "hdrfilm", "width": SIDE, "height": SIDE, "rfilter": {"type": "box"}}
+    above = mi.ScalarTransform4f().look_at(origin=[0, 0, 5], target=[0, 0, 0], up=[0, 1, 0])
+    scene: Any = {"type": "scene", "sensor": {"type": "orthographic", "to_world": above, "film": film}}
+    catcher, plate = disk("catcher", 0.5, 0.0, plain), disk("plate", 0.25, 1.0, plain)
+    loaded = mi.load_dict(scene | catcher | plate)
+    assert not otherwise_pixels(loaded, loaded.sensors()[0]).any()
+    catcher["catcher"]["seen_otherwise"] = {"type": "uniform", "value": 1.0}
+    loaded = mi.load_dict(scene | catcher | plate)
+    found = otherwise_pixels(loaded, loaded.sensors()[0])
+    ring = circle(0.5) & ~circle(0.25)
+    assert found.shape == ring.shape
+    edge = 2 / SIDE  # a pixel counts where a part of it does
+    assert found[ring].all()
+    assert not found[~circle(0.5 + edge) | circle(0.25 - edge)].any()
+
+
 GLASS = {"type": "dielectric", "int_ior": 1.5, "ext_ior": 1.0}
 
 

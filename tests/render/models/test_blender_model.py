@@ -61,6 +61,41 @@ def test_starts_at_the_sockets_and_follows_finite_differences(tmp_path: Path) ->
         np.testing.assert_allclose(gradient[i], np.sum((high - low) * weight) / 2e-2, rtol=5e-3)
 
 
+@pytest.mark.parametrize(
+    ("index", "start", "lower", "upper"),
+    [
+        (3.3, 3.3, 1.01, 3.3),
+        (0.7, 0.7, 1 / 2.5, 1 / 1.01),
+        (0.2, 0.2, 0.2, 1 / 1.01),
+        (1.0, 1.01, 1.01, 2.5),
+        (1.45, 1.45, 1.01, 2.5),
+    ],
+)
+@pytest.mark.parametrize("name", ["ior", "coat_ior"])
+def test_an_unusual_index_of_the_scene_is_where_a_fit_begins(
+    tmp_path: Path, name: str, index: float, start: float, lower: float, upper: float
+) -> None:
+    """A canopy of 3.3 began at 2.5, which was the most it could be, and "kept" that."""
+    socket = {"ior": "IOR", "coat_ior": "Coat IOR"}[name]
+    sockets = SOCKETS | {socket: {"value": index}, "Transmission Weight": {"value": 1.0}}
+    renderer = load(tmp_path, (name, "roughness"), {"glaze": {"name": "Glaze", "sockets": sockets}})
+    assert renderer.table.unpack(renderer.start)[name] == pytest.approx(start)
+    assert (renderer.table[name].lower, renderer.table[name].upper) == pytest.approx((lower, upper))
+    image, pullback = renderer.image_and_pullback(renderer.start, seed=1, spp=4)
+    assert np.isfinite(image).all()
+    assert np.isfinite(pullback(np.ones_like(image))).all()
+
+
+def test_an_unusual_index_of_a_shader_in_a_mix_is_where_a_fit_begins(tmp_path: Path) -> None:
+    sockets = {"IOR": {"value": 3.3}, "Base Color": {"value": [0.5, 0.5, 0.5]}, "Coat IOR": {"value": 3.3}}
+    free = {"IOR": "Pane/IOR", "Coat IOR": "Pane/Coat IOR"}
+    pane = {"name": "Pane", "shader": "principled", "sockets": sockets, "weight": {"value": 0.5}, "free": free}
+    mixed = {"name": "Paint", "sockets": SOCKETS, "weight": {"value": 0.5}, "leaves": [pane]}
+    renderer = load(tmp_path, ("roughness",), {"glaze": mixed})
+    values = renderer.table.unpack(renderer.start)
+    assert (values["Pane/IOR"], values["Pane/Coat IOR"]) == (3.3, 3.3)
+
+
 def test_the_strength_of_a_shader_in_a_mix_may_be_five_times_that_of_the_scene(tmp_path: Path) -> None:
     """A neon of strength 20 began at 5, which was the most it could be."""
     sockets = {"Emission Color": {"value": [1.0, 0.2, 0.1]}, "Emission Strength": {"value": 20.0}}

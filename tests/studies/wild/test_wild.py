@@ -73,3 +73,26 @@ def test_a_file_is_read_in_a_process_of_its_own(tmp_path):
     subprocess.run([sys.executable, "-c", code], check=True, capture_output=True)
     (row,) = child(["studies.wild.in_blender", "read", str(path)], 60.0)["materials"]
     assert (row["object"], row["sort"], row["errors"], row["view"]) == ("Cube", "principled", [], -1)
+
+
+def test_another_seed_is_another_order():
+    rows = [{"file": "a/0", "materials": [FINE | {"material": str(number)} for number in range(20)]}]
+    orders = [[m["material"] for m in in_turn(rows, seed)] for seed in (20, 20, 21)]
+    assert orders[0] == orders[1] != orders[2]
+
+
+def test_values_inside_nodes_are_moved_where_asked_for(tmp_path):
+    path = tmp_path / "cube.blend"
+    code = (
+        "import bpy, os\n"
+        "tree = bpy.data.materials['Material'].node_tree\n"
+        "ramp = tree.nodes.new('ShaderNodeValToRGB')\n"
+        "tree.links.new(ramp.outputs[0], tree.nodes['Principled BSDF'].inputs['Base Color'])\n"
+        f"bpy.ops.wm.save_as_mainfile(filepath={str(path)!r})\n"
+        "os._exit(0)"
+    )
+    subprocess.run([sys.executable, "-c", code], check=True, capture_output=True)
+    words = ["studies.wild.in_blender", "prepare", str(path), "--object=Cube", "--seed=3", "--size=8", "--samples=1"]
+    plain, inside = (child([*words, f"--out={tmp_path}", *more], 60.0)["moved"] for more in ([], ["--inside"]))
+    assert plain == ["Roughness", "Metallic"]
+    assert inside == [*plain, "Color Ramp (inside)"]
