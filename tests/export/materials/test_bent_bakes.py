@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from typing import Any
 from xml.etree import ElementTree
@@ -194,8 +195,46 @@ def test_normals_of_a_floor_that_is_seen_from_behind(scene: Any, in_both: Any, k
     assert ours[:8].mean() == pytest.approx(theirs[:8].mean(), rel=0.01)
     turned = [m.get("turned", False) for m in report.request["materials"].values()]
     assert any(turned) == (kind not in ("Position", "Object", "BOTH by UV"))
-    # that is right here alone, where the corners have not moved
-    assert any("on back faces Displacement and Bump" in note for note in report.notes) == (kind == "BOTH by UV")
+
+
+def _vase(coordinate: str, *, is_behind: bool, is_flat: bool) -> Any:
+    """An open vase of 12 facets that waves move and bend; returns a target beside it."""
+    add_camera("ORTHO", (0.0, -5.0, 0.5), (math.pi / 2, 0.0, 0.0), ortho_scale=3.0)
+    add_light("SUN", rotation=(0.5, 1.1, 0.0), energy=3.0)
+    bpy.ops.mesh.primitive_cylinder_add(vertices=12, end_fill_type="NOTHING")
+    vase, target = bpy.context.object, add_quad("T", 0.2, 2.0, new_material("T"))
+    vase.data.polygons.foreach_set("use_smooth", [not is_flat] * len(vase.data.polygons))
+    vase.data.materials.append(new_material("Vase", Roughness=0.8))
+    nodes = Nodes(vase.data.materials[0])
+    separate, wide, wave, moved = (nodes.new(kind) for kind in ("SeparateXYZ", "Math", "Math", "Displacement"))
+    wide.operation, wave.operation, wide.inputs[1].default_value = "MULTIPLY", "SINE", 5.0
+    moved.inputs["Midlevel"].default_value, moved.inputs["Scale"].default_value = 0.0, 0.09
+    output = nodes.tree.get_output_node("CYCLES").inputs["Displacement"]
+    for source, socket in ((nodes.new("TexCoord").outputs[coordinate], separate), (separate.outputs["Z"], wide),
+                           (wide.outputs[0], wave), (wave.outputs[0], moved)):  # fmt: skip
+        nodes.tree.links.new(source, socket.inputs[0])
+    nodes.tree.links.new(moved.outputs[0], output)
+    vase.data.materials[0].displacement_method = "BOTH"
+    if is_behind:
+        vase.data.flip_normals()
+    return target
+
+
+@pytest.mark.parametrize("coordinate", ["UV", "Object"])
+@pytest.mark.parametrize("is_behind", [False, True])
+@pytest.mark.parametrize("is_flat", [False, True])
+def test_displacement_and_bump_bends_the_normals_that_faces_had_before_they_moved(
+    scene: Any, in_both: Any, coordinate: str, is_behind: bool, is_flat: bool
+) -> None:
+    """With those that the moved faces have blocks of 4 x 4 pixels were up to 64 % of the picture's mean off.
+
+    That was on backs, which are mirrored at them; where shadow rays start by them 10 % were missing in front, too.
+    """
+    scene.cycles.samples = 256
+    report, ours, theirs = in_both(_vase(coordinate, is_behind=is_behind, is_flat=is_flat))
+    assert [note for note in report.notes if "'Vase'" in note and "is baked" not in note] == []
+    off = (ours - theirs).mean(axis=2).reshape(8, 4, 8, 4).mean(axis=(1, 3)) / theirs.mean()
+    assert abs(off).max() < 0.08
 
 
 def test_a_bump_leans_along_the_faces_as_a_displacement_has_turned_them(scene: Any, in_both: Any) -> None:
