@@ -73,8 +73,8 @@ def moved_corners(
             stage.scene.cycles.samples = 1
             offsets = _baked(stage, materials, "up") - _baked(stage, materials, "down")
             _, _, was_smooth = corners_of(mesh)
-            _keep_still(mesh, [shown is not None and bends_normals(shown.original) for shown in slots], materials)
-            normals = 2.0 * _baked(stage, materials, "normal") - 1.0
+            bent = np.array([shown is not None and _does_both(shown.original) for shown in slots])
+            normals = _normals(stage, materials, bent)
             linear = np.array(instance.matrix_world.to_3x3(), dtype=np.float64)
             places, loops, is_smooth = corners_of(mesh)
             offsets, normals = offsets @ np.linalg.pinv(linear).T, normals @ linear
@@ -115,20 +115,36 @@ def _displacing(material: bpy.types.Material | None) -> bpy.types.Material:
     return copy
 
 
-def _keep_still(mesh: Any, bent: list[bool], materials: list[bpy.types.Material]) -> None:
-    """Of slots whose materials move faces and have `bent` normals, too, take away what moves, and make faces smooth
-    whose normals Cycles bends as if they were."""
-    for slot, material in enumerate(materials):
-        displacement: Any = displacement_of(material)
-        bent[slot] &= displacement is not None
-        if bent[slot]:
-            displacement.id_data.links.remove(displacement.links[0])
-    if not bends_flat_faces_as_smooth():
-        return
-    slots, smooth = (np.empty(len(mesh.polygons), dtype=kind) for kind in (np.int32, np.bool_))
-    mesh.polygons.foreach_get("material_index", slots)
-    mesh.polygons.foreach_get("use_smooth", smooth)
-    mesh.polygons.foreach_set("use_smooth", smooth | np.array(bent)[slots])
+def _normals(stage: Stage, materials: list[bpy.types.Material], bent: NDArray[np.bool_]) -> Corners:
+    """Normals at the corners of the faces; in slots whose materials have `bent` them, too, those of before anything
+    moved, on flat faces those of smooth ones where Cycles bends these."""
+    mesh: Any = stage.item.data
+    slots, smooth, corners = (np.empty(len(mesh.polygons), dtype=kind) for kind in (np.int32, np.bool_, np.int32))
+    for name, values in (("material_index", slots), ("use_smooth", smooth), ("loop_total", corners)):
+        mesh.polygons.foreach_get(name, values)
+    is_bent = bent[slots]
+    if bends_flat_faces_as_smooth():
+        mesh.polygons.foreach_set("use_smooth", smooth | is_bent)
+    for material in np.array(materials)[bent]:
+        _keep_still(material)
+    found = 2.0 * _baked(stage, materials, "normal") - 1.0
+    if bent.any() and sum(map(_keep_still, materials)):
+        of_before = 2.0 * _baked(stage, materials, "normal") - 1.0
+        found = np.where(np.repeat(is_bent, corners)[:, None], of_before, found)
+    return found
+
+
+def _does_both(material: bpy.types.Material) -> bool:
+    """Whether a material moves faces and bends normals, too."""
+    return moves_faces(material) and bends_normals(material)
+
+
+def _keep_still(material: bpy.types.Material) -> bool:
+    """Take away what displaces a material of `_displacing`, and return whether anything did."""
+    displacement: Any = displacement_of(material)
+    if displacement is not None:
+        displacement.id_data.links.remove(displacement.links[0])
+    return displacement is not None
 
 
 def _add_colors(tree: Any) -> None:
