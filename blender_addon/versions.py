@@ -203,6 +203,14 @@ def rounds_beside_flat_faces() -> bool:
     return bpy.app.version < (5, 2, 0)
 
 
+def bends_flat_faces_as_smooth() -> bool:
+    """Whether Displacement and Bump bends the normals that flat faces would have if they were smooth.
+
+    Before, it bends those of their planes (`svm_node_enter_bump_eval`).
+    """
+    return bpy.app.version >= (5, 0, 0)
+
+
 def gives_below_zero() -> bool:
     """Whether a negative emission of a Principled BSDF takes light away, as that of Emission does; not from 5.0 on."""
     return bpy.app.version < (5, 0, 0)

@@ -19,6 +19,7 @@ import numpy as np
 from ..export.audit.scene_table import BY_SIMPLIFY
 from ..export.meshes.read_mesh import material_of_slot, slot_count
 from ..export.nodes.dependence import OF_SURROUNDINGS, OF_VIEW, asked_for, turns_with_camera
+from ..export.nodes.displacement import moves_faces
 from ..probe.graph_copy import nodes_of
 from ..versions import node_tree_of
 from .stage import PLACE, mesh_of
@@ -73,6 +74,11 @@ def surface_key(
         if item.original.vertex_groups and any(node.bl_idname == "ShaderNodeAttribute" for node in nodes_of(tree)):
             raise _NoKeyError
         key.put(material.displacement_method, [list(row) for row in instance.matrix_world])
+        for number in range(slot_count(item)):  # what moves its neighbours moves and turns its own edges
+            other = material_of_slot(item, number)
+            if number != slot and other is not None and moves_faces(other.original):
+                key.owner(other.original, node_tree_of(other.original))
+                key.put(number, other.original.displacement_method)
         key.put([list(getattr(item, name)) for name in PLACE])
         data = item.original.data
         if hasattr(data, "texspace_location"):

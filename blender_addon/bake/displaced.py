@@ -4,7 +4,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import bpy
 import numpy as np
@@ -12,8 +12,8 @@ from numpy.typing import NDArray
 
 from ..export.meshes.read_mesh import corners_of, flat_normals, material_of_slot, slot_count
 from ..export.nodes.dependence import asked_of_place
-from ..export.nodes.displacement import moves_faces
-from ..versions import active_output
+from ..export.nodes.displacement import bends_normals, displacement_of, moves_faces
+from ..versions import active_output, bends_flat_faces_as_smooth
 from .stage import Stage, bake, staged
 
 Corners = NDArray[np.float64]  # (corners of faces, 3)
@@ -26,19 +26,32 @@ def displaced_corners(
 ) -> dict[str, Any]:
     """Write `positions` and `normals` of all triangles of an instance's object into `folder`, in the object's space.
 
-    Both are float32 (triangles, 3, 3), normals of any length, as Cycles has them after the displacement: it moves
-    vertices and makes normals anew.
+    Both are float32 (triangles, 3, 3), normals of any length, as Cycles has them after the displacement. `rounded`
+    (triangles,) says which of the triangles are flat and have the normals of smooth ones.
     """
-    positions, normals = moved_corners(scene, instance, depsgraph)
-    np.save(folder / "positions.npy", positions)
-    np.save(folder / "normals.npy", normals)
-    return {"positions": "positions.npy", "normals": "normals.npy"}
+    moved = moved_corners(scene, instance, depsgraph)
+    for name, values in moved._asdict().items():
+        np.save(folder / f"{name}.npy", values)
+    return {name: f"{name}.npy" for name in moved._fields}
+
+
+class Moved(NamedTuple):
+    """What `displaced_corners` writes, and which triangles have other normals than that of their plane."""
+
+    positions: NDArray[np.float32]
+    normals: NDArray[np.float32]
+    rounded: NDArray[np.bool_]
+    has_own: NDArray[np.bool_]
 
 
 def moved_corners(
     scene: bpy.types.Scene, instance: bpy.types.DepsgraphObjectInstance, depsgraph: bpy.types.Depsgraph
-) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
-    """Positions and normals of `displaced_corners`."""
+) -> Moved:
+    """Positions and normals of `displaced_corners`.
+
+    Cycles makes normals anew where a material moves faces alone. Where it bends normals, too, they are those of before
+    (`GeometryManager::displace`, in 4.2 as in 5.2).
+    """
     materials: list[bpy.types.Material] = []
     try:
         with staged(scene, instance, depsgraph) as stage:
@@ -59,14 +72,17 @@ def moved_corners(
             _keep_places(mesh, np.array(matrix, dtype=np.float64))
             stage.scene.cycles.samples = 1
             offsets = _baked(stage, materials, "up") - _baked(stage, materials, "down")
-            normals = 2.0 * _baked(stage, materials, "normal") - 1.0
+            _, _, was_smooth = corners_of(mesh)
+            bent = np.array([shown is not None and _does_both(shown.original) for shown in slots])
+            normals = _normals(stage, materials, bent)
             linear = np.array(instance.matrix_world.to_3x3(), dtype=np.float64)
             places, loops, is_smooth = corners_of(mesh)
             offsets, normals = offsets @ np.linalg.pinv(linear).T, normals @ linear
             moved = (places + offsets[loops].reshape(-1, 3, 3)).astype(np.float32)
-            has_own = is_smooth | bool(mesh.has_custom_normals)
+            has_custom = bool(mesh.has_custom_normals)
+            has_own = is_smooth | has_custom
             found = np.where(has_own[:, None, None], normals[loops].reshape(-1, 3, 3), flat_normals(moved))
-            return moved, found.astype(np.float32)
+            return Moved(moved, found.astype(np.float32), is_smooth & ~(was_smooth | has_custom), has_own)
     finally:
         for material in materials:
             bpy.data.materials.remove(material)
@@ -97,6 +113,38 @@ def _displacing(material: bpy.types.Material | None) -> bpy.types.Material:
     tree.links.new(emission.outputs[0], output.inputs["Surface"])
     _add_colors(tree)
     return copy
+
+
+def _normals(stage: Stage, materials: list[bpy.types.Material], bent: NDArray[np.bool_]) -> Corners:
+    """Normals at the corners of the faces; in slots whose materials have `bent` them, too, those of before anything
+    moved, on flat faces those of smooth ones where Cycles bends these."""
+    mesh: Any = stage.item.data
+    slots, smooth, corners = (np.empty(len(mesh.polygons), dtype=kind) for kind in (np.int32, np.bool_, np.int32))
+    for name, values in (("material_index", slots), ("use_smooth", smooth), ("loop_total", corners)):
+        mesh.polygons.foreach_get(name, values)
+    is_bent = bent[slots]
+    if bends_flat_faces_as_smooth():
+        mesh.polygons.foreach_set("use_smooth", smooth | is_bent)
+    for material in np.array(materials)[bent]:
+        _keep_still(material)
+    found = 2.0 * _baked(stage, materials, "normal") - 1.0
+    if bent.any() and sum(map(_keep_still, materials)):
+        of_before = 2.0 * _baked(stage, materials, "normal") - 1.0
+        found = np.where(np.repeat(is_bent, corners)[:, None], of_before, found)
+    return found
+
+
+def _does_both(material: bpy.types.Material) -> bool:
+    """Whether a material moves faces and bends normals, too."""
+    return moves_faces(material) and bends_normals(material)
+
+
+def _keep_still(material: bpy.types.Material) -> bool:
+    """Take away what displaces a material of `_displacing`, and return whether anything did."""
+    displacement: Any = displacement_of(material)
+    if displacement is not None:
+        displacement.id_data.links.remove(displacement.links[0])
+    return displacement is not None
 
 
 def _add_colors(tree: Any) -> None:

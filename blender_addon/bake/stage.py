@@ -10,7 +10,7 @@ from typing import NamedTuple
 import bpy
 from mathutils import Matrix
 
-from ..export.render_state import is_edited, shown_by
+from ..export.render_state import geometry_of, is_edited, shown_by, without_modifiers
 from ..versions import keeps_data_below_subdivision
 
 NAME = "material_fit_bake"
@@ -48,8 +48,12 @@ def staged(
 def mesh_of(instance: bpy.types.DepsgraphObjectInstance, depsgraph: bpy.types.Depsgraph) -> bpy.types.Mesh:
     """A new mesh of the faces that an instance shows: those of its object, or others that geometry nodes have made.
 
-    Modifiers are evaluated anew for all its layers: in the object's own place, which an armature asks for.
+    Modifiers are evaluated anew for all its layers: in the object's own place, which an armature asks for. Where
+    particles are of what the layer does not render there are none.
     """
+    source = geometry_of(instance, without_modifiers(depsgraph.view_layer))
+    if source is instance.object.original:
+        return source.data.copy()
     item = instance.object.original.evaluated_get(depsgraph)
     if instance.is_instance and instance.object.data != item.data:
         return instance.object.data.copy()

@@ -34,7 +34,7 @@ from ..probe.light_path import (
 )
 from ..versions import active_output
 from .stage import bake
-from .surface_stage import TANGENT, SurfaceStage, surface_stage
+from .surface_stage import NORMAL, TANGENT, SurfaceStage, surface_stage
 
 Pixels = NDArray[np.float32]
 
@@ -267,10 +267,12 @@ class _Bake:
     def local_normal(self, socket: bpy.types.NodeSocket | None) -> Pixels:
         """A normal in the frame of the map; without a `socket` the one that a displacement by bump makes."""
         if self._frame is None:
-            attribute = self._tree.nodes.new("ShaderNodeAttribute")
-            attribute.attribute_name = TANGENT
             with unbent(self._material):
-                self._frame = _unit(self._vector(self._geometry)), _unit(self._vector(attribute.outputs["Vector"]))
+                smooth, along = self._vector(self._geometry), self._vector(self._attribute(TANGENT))
+                if NORMAL in self._stage.item.data.attributes:
+                    kept = self._vector(self._attribute(NORMAL))
+                    smooth = np.where(np.linalg.norm(kept, axis=2, keepdims=True) > 0.5, kept, smooth)
+            self._frame = _unit(smooth), _unit(along)
         smooth, along = self._frame
         normal = self._vector(socket or self._geometry)
         if self._size < FINEST_NORMALS and 1.0 - np.mean((normal[self._where] ** 2).sum(axis=1)) > MOST_SPREAD:
@@ -293,6 +295,11 @@ class _Bake:
         if socket is not None:
             return turns_on_backs(socket)
         return is_displaced_hollow(self._material, by_language=self._stage.scene.cycles.shading_system)
+
+    def _attribute(self, name: str) -> bpy.types.NodeSocket:
+        node: Any = self._tree.nodes.new("ShaderNodeAttribute")
+        node.attribute_name = name
+        return node.outputs["Vector"]
 
     @property
     def _geometry(self) -> bpy.types.NodeSocket:

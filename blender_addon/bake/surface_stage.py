@@ -12,13 +12,14 @@ import numpy as np
 from mathutils import Matrix  # pyright: ignore[reportMissingImports]
 from numpy.typing import NDArray
 
-from ..export.meshes.read_mesh import material_of_slot, slot_count
+from ..export.meshes.read_mesh import corners_of, material_of_slot, slot_count
 from ..export.nodes.displacement import moves_faces
-from .displaced import moved_corners
+from .displaced import Moved, moved_corners
 from .stage import Stage, staged
 from .unwrap import unwrapped
 
-UV_MAP, TANGENT, NO_MAP = "material_fit", "material_fit_tangent", "material_fit_none"
+UV_MAP, NO_MAP = "material_fit", "material_fit_none"
+TANGENT, NORMAL = "material_fit_tangent", "material_fit_normal"  # attributes
 BLEED = 8  # texels around islands that take the colour beside them
 SAMPLES = 4  # a texel, so that fine patterns are averaged
 MOST_UV_MAPS = 8  # of a mesh
@@ -54,12 +55,13 @@ def surface_stage(
 ) -> Iterator[SurfaceStage]:
     """The object of an instance alone, with a UV map for the faces in `slot`, which have `material`.
 
-    What is `for_normals` has the frames of faces that a displacement has moved, which take Cycles a bake to know.
+    What is `for_normals` has the frames of faces that a displacement has moved, which take Cycles a bake to know: the
+    attribute `NORMAL` has their smooth normals, and zero on flat faces.
     """
     last = max(slot_count(instance.object) - 1, 0)
     slots = [material_of_slot(instance.object, number) for number in range(last + 1)]
     is_moved = for_normals and any(shown is not None and moves_faces(shown.original) for shown in slots)
-    moved = moved_corners(scene, instance, depsgraph)[0] if is_moved else None
+    moved = moved_corners(scene, instance, depsgraph) if is_moved else None
     blank = bpy.data.materials.new("material_fit_blank")
     try:
         with staged(scene, instance, depsgraph) as stage:
@@ -77,7 +79,9 @@ def surface_stage(
             layer = mesh.uv_layers.new(name=UV_MAP, do_init=False)
             layer.uv.foreach_set("vector", uv.reshape(-1))
             mesh.uv_layers.active = layer
-            corners = _add_tangents(mesh, uv, instance.matrix_world, moved)
+            corners = _add_tangents(mesh, uv, instance.matrix_world, None if moved is None else moved.positions)
+            if moved is not None:
+                _add_normals(mesh, instance.matrix_world, moved)
             mesh.materials.clear()
             for number in range(last + 1):
                 mesh.materials.append(material if number == slot else blank)
@@ -115,3 +119,14 @@ def _add_tangents(
     attribute = mesh.attributes.new(TANGENT, "FLOAT_VECTOR", "CORNER")
     attribute.data.foreach_set("vector", at_corner.reshape(-1))
     return corners
+
+
+def _add_normals(mesh: bpy.types.Mesh, matrix: Matrix, moved: Moved) -> None:
+    """Give `mesh` the smooth normals of its corners as an attribute in world space, zero where faces are flat."""
+    _, loops, _ = corners_of(mesh)
+    normals = moved.normals @ np.linalg.pinv(np.array(matrix.to_3x3(), dtype=np.float64))
+    normals /= np.maximum(np.linalg.norm(normals, axis=2, keepdims=True), 1e-20)
+    at_corner = np.zeros((len(mesh.loops), 3), dtype=np.float32)
+    at_corner[loops] = np.where(moved.has_own[:, None, None], normals, 0.0).reshape(-1, 3)
+    attribute = mesh.attributes.new(NORMAL, "FLOAT_VECTOR", "CORNER")
+    attribute.data.foreach_set("vector", at_corner.reshape(-1))

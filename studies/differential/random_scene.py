@@ -330,9 +330,10 @@ GROUPS = {
 SETTINGS = tuple(setting for group in GROUPS.values() for setting in group)
 # of what the plain scene has at times, and of what two settings make together
 PLAIN_WORDS = (
-    "casts no shadows", "Subsurface is fitted as diffuse", "has colours where its alpha is 0",
+    "casts no shadows", "Subsurface is fitted as diffuse", "its Subsurface is shown as diffuse",
+    "has colours where its alpha is 0",
     "takes Generated coordinates after", "all have the bake of the first", "its depth of field is left out",
-    "Open Shading Language multiplies", "asks Light Path for", "rays; in the fit it is not.",
-    "in the fit both sides are as its front is", "on back faces Displacement and Bump",
+    "Open Shading Language", "asks Light Path for", "rays; in the fit it is not.",
+    "in the fit both sides are as its front is", "whose axes have different scales, Displacement",
 )  # fmt: skip
 WORDS = {setting.name: setting.words for setting in SETTINGS}

@@ -55,6 +55,12 @@ class Piece:
     def __len__(self) -> int:
         return int(np.count_nonzero(self.faces))
 
+    @property
+    def stretch(self) -> float:
+        """How many times as long equal lengths may become along one direction as along another."""
+        sizes = np.linalg.svd(self.matrix[:3, :3], compute_uv=False)
+        return float(sizes[0] / max(sizes[-1], 1e-30))
+
     def placed(self) -> TriangleMesh:
         """Its `world_mesh`."""
         return world_mesh(self.mesh, self.faces, self.matrix)

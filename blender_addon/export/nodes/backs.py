@@ -47,16 +47,18 @@ def is_displaced_hollow(material: bpy.types.Material, *, by_language: bool = Fal
     return not (is_hollow or by_language) if moves_faces(material) else is_hollow
 
 
-def note_displaced_backs(material: bpy.types.Material, findings: Findings, *, by_language: bool) -> None:
-    """Name a material whose back Cycles mirrors at the normals that its faces had before they moved.
+def note_displaced_backs(material: bpy.types.Material, owner: str, findings: Findings, *, by_language: bool) -> None:
+    """Name a material on an object of uneven scale whose back Cycles mirrors before that scale.
 
-    The fit mirrors it at those that they have: outside of a vase of 12 facets a block of 8 x 8 pixels was 7 % off.
+    The fit mirrors it in the world: outside of a vase scaled by 0.7, 1 and 1.2 a block of 8 x 8 pixels was 14 % of the
+    picture's mean off.
     """
     both = moves_faces(material) and bends_normals(material)
     if both and not is_displaced_hollow(material, by_language=by_language):
         findings.note(
-            f"Material '{material.name}': on back faces Displacement and Bump bends normals in another way than in "
-            "Cycles. Choose Displacement Only, or turn the faces round, and render the reference anew."
+            f"Material '{material.name}': on back faces of '{owner}', whose axes have different scales, Displacement "
+            "and Bump bends normals in another way than in Cycles. Apply the scale, or turn the faces round, and "
+            "render the reference anew."
         )
 
 

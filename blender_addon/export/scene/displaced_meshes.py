@@ -7,12 +7,13 @@ from dataclasses import replace
 
 import bpy
 import numpy as np
+from numpy.typing import NDArray
 
 from ...bake.baker import BakeError, Baker
 from ...bake.requests import name_of
 from ..findings import Findings
 from ..meshes.mesh_arrays import CornerMesh, Piece, joined
-from .scene_data import SceneData
+from .scene_data import SceneData, Shape, Terminator
 
 OTHER_FACES = "Its object has other faces in the second Blender."
 
@@ -25,6 +26,7 @@ class DisplacedMeshes:
         self._asked: dict[CornerMesh, tuple[str, int | BakeError]] = {}  # with the object's name
         self._pieces: dict[str, list[Piece]] = {}
         self._moved: dict[CornerMesh, CornerMesh] = {}
+        self._rounded: dict[CornerMesh, NDArray[np.bool_]] = {}  # triangles that are flat and have smooth normals
 
     def ask(self, instance: bpy.types.DepsgraphObjectInstance, mesh: CornerMesh) -> None:
         """Have the mesh of an instance displaced."""
@@ -47,16 +49,23 @@ class DisplacedMeshes:
                 if not isinstance(number, int):
                     raise number
                 answer, folder = self._baker.wait(number)
-                positions, normals = (np.load(folder / answer[key]) for key in ("positions", "normals"))
+                positions, normals, rounded = (np.load(folder / answer[k]) for k in ("positions", "normals", "rounded"))
                 if positions.shape != mesh.positions.shape:
                     raise BakeError(OTHER_FACES)
                 self._moved[mesh] = replace(mesh, positions=positions, normals=normals)
+                self._rounded[mesh] = rounded
             except BakeError as problem:
                 findings.note(f"The displacement of '{owner}' is left out: {problem}")
         for number, shape in enumerate(data.shapes):
             if shape.identifier in self._pieces:
                 pieces = [replace(p, mesh=self.of(p.mesh)).placed() for p in self._pieces[shape.identifier]]
-                data.shapes[number] = replace(shape, mesh=joined(pieces))
+                data.shapes[number] = replace(shape, mesh=joined(pieces), terminator=self._terminator(shape))
+
+    def _terminator(self, shape: Shape) -> Terminator:
+        """A shape's own; shadow rays start on flat faces, whatever normals they have."""
+        pieces = self._pieces[shape.identifier]
+        flat = all(piece.mesh in self._rounded and self._rounded[piece.mesh][piece.faces].all() for piece in pieces)
+        return replace(shape.terminator, geometry_offset=0.0) if flat else shape.terminator
 
     def of(self, mesh: CornerMesh) -> CornerMesh:
         """The mesh where its displacement puts it, once all is finished."""

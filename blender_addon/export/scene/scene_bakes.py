@@ -178,8 +178,8 @@ class SceneBakes:
                 data.materials[identifier] = grey(material.name)
                 asked = self._surfaces[identifier] = _Asked(material, item.name, request)
                 others = other_looks(node_tree_of(material)) or _looks_behind(data.camera, surface)
-                if _back_is_met(data.camera, surface):
-                    note_displaced_backs(material, findings, by_language=self._by_language)
+                if surface.piece.stretch > 1.0 + SIZE_STEP and _back_is_met(data.camera, surface):
+                    note_displaced_backs(material, item.name, findings, by_language=self._by_language)
                 asked.looks = {rays: f"{identifier}_{of}" for rays, of in others.items()}
                 for of in dict.fromkeys(others.values()):
                     self._surfaces[f"{identifier}_{of}"] = _Asked(material, item.name, request | {"rays": of})

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Alpha of pictures that Open Shading Language reads by itself: named where Cycles has other colours."""
+"""Pictures that Open Shading Language reads by itself: named where Cycles has other colours."""
 
 from __future__ import annotations
 
@@ -58,3 +58,34 @@ def test_what_is_not_said_is_as_in_cycles(
     if not is_said:
         ours = np.mean(render_job(report.folder, 128), axis=0)
         assert ours.mean() == pytest.approx(theirs.mean(), rel=0.01)
+
+
+@pytest.mark.parametrize("is_packed", [False, True])
+def test_a_file_that_this_language_averages_is_named(
+    scene: Any, in_both: Callable[[Any], Any], tmp_path: Path, is_packed: bool
+) -> None:
+    """A ball is black where random numbers are low: their means are not, and none of the language's packed files."""
+    world_color(scene, 1.0)
+    scene.cycles.shading_system, scene.cycles.samples = True, 256
+    add_camera("ORTHO", ortho_scale=2.2)
+    target, material = add_quad("Target", 0.2, 1.1, new_material("Target")), new_material("Ball")
+    bpy.ops.mesh.primitive_uv_sphere_add()
+    bpy.context.object.data.materials.append(material)
+    tree = material.node_tree
+    fine, node, above = (tree.nodes.new(f"ShaderNode{kind}") for kind in ("Mapping", "TexImage", "Math"))
+    fine.inputs["Scale"].default_value = (8.0, 8.0, 1.0)
+    node.image, above.operation, above.inputs[1].default_value = picture(tmp_path, "JPEG", "NONE"), "GREATER_THAN", 0.3
+    if is_packed:
+        node.image.pack()
+    shader = tree.get_output_node("CYCLES").inputs[0].links[0].from_node
+    for source, socket in (
+        (tree.nodes.new("ShaderNodeTexCoord").outputs["Generated"], fine.inputs["Vector"]),
+        (fine.outputs["Vector"], node.inputs["Vector"]),
+        (node.outputs["Color"], above.inputs[0]),
+        (above.outputs[0], shader.inputs["Base Color"]),
+    ):
+        tree.links.new(source, socket)
+    report, ours, theirs = in_both(target)
+    assert any("Open Shading Language averages the pixels of" in note for note in report.notes) == (not is_packed)
+    off = abs((ours - theirs).mean(axis=2)).reshape(4, 8, 4, 8).mean(axis=(1, 3)).max() / theirs.mean()
+    assert (off < 0.1) == is_packed

@@ -188,6 +188,19 @@ def test_what_is_painted_next_is_another_key_again(ball: Any) -> None:
     assert key_of(ball) not in (before, None)
 
 
+def test_a_neighbour_that_moves_faces_in_another_way_is_another_key(ball: Any) -> None:
+    other = new_material("Other")
+    ball.data.materials.append(other)
+    moved = other.node_tree.nodes.new("ShaderNodeDisplacement")
+    other.node_tree.links.new(moved.outputs[0], other.node_tree.get_output_node("CYCLES").inputs["Displacement"])
+    keys = set()
+    for method in ("BUMP", "DISPLACEMENT", "BOTH"):
+        other.displacement_method = method
+        keys.add(key_of(ball))
+    moved.inputs["Height"].default_value = 0.7
+    assert len({*keys, key_of(ball)} - {None}) == 4
+
+
 @pytest.mark.parametrize("swapped", ["outputs", "inputs"])
 def test_two_links_that_change_places_are_another_key(ball: Any, swapped: str) -> None:
     """The same sockets are linked, each to the other's end."""

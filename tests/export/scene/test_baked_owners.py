@@ -156,6 +156,33 @@ def test_an_instance_has_that_colour_where_its_object_is_in_the_scene_itself(
     assert np.abs(np.array(baked) - carrier.color[:3]).max(axis=1).min() < 1e-3
 
 
+@pytest.mark.parametrize("is_displaced", [False, True])
+def test_particles_of_what_is_not_rendered_are_baked_without_its_modifiers(
+    is_displaced: bool, scene: Any, stage: Any, in_both: Any
+) -> None:
+    """Cycles takes none of them; baked with them the object had other faces, and was grey and not displaced."""
+    target, box = stage
+    scene.cycles.samples = 256
+    box.hide_render = True
+    box.modifiers.new("Round", "SUBSURF").render_levels = 2
+    nodes = Nodes(box.data.materials[0])
+    colors = nodes.new("TexCoord").outputs["Generated"]
+    nodes.tree.links.new(colors, nodes.principled.inputs["Base Color"])
+    if is_displaced:
+        moved = nodes.new("VectorDisplacement")
+        nodes.tree.links.new(colors, moved.inputs["Vector"])
+        nodes.tree.links.new(moved.outputs[0], nodes.tree.get_output_node("CYCLES").inputs["Displacement"])
+        box.data.materials[0].displacement_method = "DISPLACEMENT"
+    carrier = add_quad("Carrier", 2.0, -1.0, new_material("Carrier"))
+    made = carrier.modifiers.new("Particles", "PARTICLE_SYSTEM").particle_system.settings
+    made.type, made.count, made.particle_size, made.use_advanced_hair = "HAIR", 1, 0.5, True
+    made.render_type, made.instance_object = "OBJECT", box
+    report, ours, theirs = in_both(target)
+    assert [note for note in report.notes if "could not be baked" in note or "left out" in note] == []
+    off = (ours - theirs).mean(axis=2).reshape(4, 8, 4, 8).mean(axis=(1, 3)) / theirs.mean()
+    assert abs(off).max() < 0.02
+
+
 @pytest.mark.parametrize("shown_by", ["parent", "instancer"])
 def test_an_object_is_told_its_own_place(shown_by: str, stage: Any, export: Any, render_cycles: Any) -> None:
     """By its path, whatever its parent or its instancer does to it; a bake had what both make together."""
