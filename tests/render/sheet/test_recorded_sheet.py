@@ -3,6 +3,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -10,6 +12,7 @@ from mfo_backend.render.paths.recorded_scene import RecordedScene
 from mfo_backend.render.sheet.recorded_sheet import RecordedSheet
 from mfo_backend.render.sheet.sheet_renderer import SheetRenderer
 from tests.fit.pictures.two_scenes import VALUES, views
+from tests.render.paths.test_returned_light import START, room
 from tests.render.scenes import AREA, POINT
 
 GAINS = (1.0, 2.5)
@@ -39,6 +42,22 @@ def test_each_picture_is_on_the_sheet_as_it_is_alone(tmp_path, lights):
             np.testing.assert_allclose(
                 rows.half_difference[numbers == number], gain * own.half_difference, rtol=1e-3, atol=1e-5 * gain
             )
+
+
+def test_light_that_returns_changes_in_all_pictures_of_a_sheet(tmp_path):
+    (tmp_path / "other").mkdir()
+    renderers = [room(folder)[0] for folder in (tmp_path, tmp_path / "other")]
+    sheet = RecordedSheet(SheetRenderer(renderers, GAINS))
+    start, x = (renderers[0].table.pack({**START, "base_color": (red, 0.7, 0.5)}) for red in (0.8, 0.6))
+    whole = sheet.record(start, grid=6, seed=3, near=True, samples=2)
+    held = replace(whole, returned=None)
+    found, known = (sheet.pictures(paths, paths.pixel_groups())(x)[:, :, 0] for paths in (whole, held))
+    numbers = sheet.renderer.sheet.numbers(whole.pixel)
+    for number, (renderer, gain) in enumerate(zip(renderers, GAINS, strict=True)):
+        expected = gain * renderer.image(x, seed=7, spp=1024).mean(axis=(0, 1))
+        np.testing.assert_allclose(found[numbers == number].mean(axis=0), expected, rtol=0.12)
+        assert known[numbers == number].mean(axis=0)[0] > 1.4 * expected[0]
+    assert sheet.returned_change(whole, x) > 0.2 > sheet.returned_change(whole, start)
 
 
 def test_pixels_and_pull_backs_of_a_sheet_are_its_pictures(tmp_path):
