@@ -78,6 +78,8 @@ def refine_sampled(setting: Setting, basins: Sequence[Vector]) -> OnRecording:
     with setting.course.stage("refine") as stage:
         recording, x, grid = _recorded_near(setting, stage, start, 0)
         stage.vector = x
+        if (graph := setting.scene.graph) is not None:  # extrapolated on the way, and perhaps wrong where it led
+            graph.settle(x[len(x) - graph.table.length :])
         # the first weights came from a model that was still off
         found = _problems(recording, x, solve_all=True)
         others = [*others, *(taken_for(x, setting.table) if setting.plan.alike else ())]

@@ -31,6 +31,11 @@ class JoinedGraph:
             self._last = parts, self._joined(parts)
         return self._last[1]
 
+    def settle(self, vector: Vector) -> None:
+        """See `GraphPictures.settle`."""
+        for graph in self._graphs:
+            graph.settle(vector)
+
     def _joined(self, parts: Sequence[GraphState]) -> GraphState:
         return GraphState(
             {name: np.concatenate([part.pictures[name] for part in parts]) for name in self.varying},

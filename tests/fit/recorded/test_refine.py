@@ -149,7 +149,7 @@ def test_a_rival_has_to_be_better_on_a_recording_of_its_own(monkeypatch, cost_th
 
     setting = SimpleNamespace(
         course=SimpleNamespace(stage=lambda name: nullcontext(SimpleNamespace(vector=None))),
-        scene=SimpleNamespace(model=SimpleNamespace(limited_width=False)),
+        scene=SimpleNamespace(graph=None, model=SimpleNamespace(limited_width=False)),
         record=record,
         table=None,
         plan=SimpleNamespace(alike=False),

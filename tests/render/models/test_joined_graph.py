@@ -35,3 +35,10 @@ def test_rows_of_two_pictures() -> None:
             np.testing.assert_array_equal(joined.coarser(state).pictures["base_color"][rows], coarse)
             (plain,) = part.plain([vector])
             np.testing.assert_array_equal(joined.plain([vector])[0]["roughness"][rows], plain["roughness"])
+
+
+def test_settling_evaluates_the_nodes_for_each_picture() -> None:
+    nodes, fewer = Nodes(), Fewer()
+    joined = JoinedGraph((graph(nodes), graph(fewer)))
+    joined.settle(np.array([0.2, 0.3, 0.9, 2.0]))
+    assert (len(nodes.variants), len(fewer.variants)) == (1, 1)
