@@ -26,7 +26,7 @@ class TechniqueLanes:
     """One technique's lanes before they are merged; positions of sample s follow s times the pixels.
 
     `others` is radiance of the held materials of a mix; what shows these alone has no `weight`. `returned` is the part
-    of the weight that the target has reflected before, and that part times how often.
+    of the weight that the target has reflected before, `returned_sums` (2, 3) the sum of that, and times how often.
     """
 
     wi: mi.Vector3f
@@ -35,7 +35,8 @@ class TechniqueLanes:
     position: mi.UInt32
     held: tuple[Any, ...]
     others: Any = None
-    returned: tuple[mi.Color3f, mi.Color3f] | None = None
+    returned: mi.Color3f | None = None
+    returned_sums: Any = 0.0
 
 
 def _radiance_of_held(
@@ -94,8 +95,8 @@ def merged_lanes(
             target = own_memory(rank[begin:end], mi.UInt32)
             pairs = [(wi, part.wi), (wo, part.wo), (weight, part.weight), *zip(held, part.held, strict=True)]
             if part.returned is not None:
-                pairs.append((returned, part.returned[0]))
-                reflected += [summed(a) for a in part.returned]
+                pairs.append((returned, part.returned))
+                reflected += part.returned_sums
             for merged, value in pairs:
                 dr.scatter(merged, value, target, mode=dr.ReduceMode.Permute)
         begin = end

@@ -30,7 +30,7 @@ from ..transport.ray_starts import RayStarts
 from ..transport.shadow_rays import ShadowRays
 from ..transport.smooth_facets import leaves_on, met_light
 from ..transport.traced_radiance import SentOn, sent_on, tells_rays
-from .merged_lanes import TechniqueLanes, coverage_of, merged_lanes
+from .merged_lanes import TechniqueLanes, coverage_of, merged_lanes, summed
 from .record_settings import RecordSettings
 from .recorded_background import add_radiance, recorded_background
 from .recorded_paths import RecordedPaths
@@ -216,7 +216,10 @@ def _sampled_lights(
             of_scene = scene.pdf_emitter_direction(si, ds, lit)
             straight = of_scene / (of_scene + si.bsdf().pdf(mi.BSDFContext(), si, wo, lit))
         mis = dr.select(passed.alpha, straight, mis)
-        started.append(_lit(hits, wo, value * (share * mis / choice * terminator.bend(si, wo, lit)), lit))
+        weight = value * (share * mis / choice * terminator.bend(si, wo, lit))
+        # none of it returns, and its lanes are merged by the kernel of those where some does
+        nothing = weight * dr.opaque(mi.Float, 0.0)
+        started.append(_lit(hits, wo, weight, lit, (nothing, nothing) if indirect else None))
 
     lobe, *u = even_points(3, number, tile, tiles, settings.seed + 0x51ED270)
     wo = proposal.sample(si.wi, lobe, mi.Point2f(*u), hits.coat, hits.diffuse)
@@ -296,6 +299,7 @@ def _lit(
     weight = mi.Color3f(weight)
     keep = keep & dr.all(dr.isfinite(weight))
     wi = hits.si.wi
+    returned = returned and tuple(dr.select(keep, part, 0.0) for part in returned)
     dr.eval(wi, wo, weight, keep, returned)
 
     def kept() -> TechniqueLanes:
@@ -306,7 +310,8 @@ def _lit(
             dr.gather(mi.Color3f, weight, index),
             dr.gather(mi.UInt32, hits.position, index),
             tuple(dr.gather(type(value), value, index) for value in hits.held),
-            returned=returned and tuple(dr.gather(mi.Color3f, part, index) for part in returned),
+            returned=returned and dr.gather(mi.Color3f, returned[0], index),
+            returned_sums=np.array([summed(part) for part in returned or ()]),
         )
         return lanes if hits.plugin is None or dr.width(index) == 0 else _parted(lanes, hits, index)
 

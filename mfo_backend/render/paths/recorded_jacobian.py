@@ -77,7 +77,7 @@ class RecordedJacobian:
         self._sockets = ParameterTable(p for p in free if p.name in model.table.names)
         self._varying = varying
         self._derivatives = derivatives
-        self._width = 1 + free.length * derivatives
+        self.width = 1 + free.length * derivatives
         values = {name: value for name, value in fixed.items() if name not in free.names}
         self._absent = [name for name, value in values.items() if value == 0.0]
         tables = (model.table, model.normals, model.walks)
@@ -111,7 +111,7 @@ class RecordedJacobian:
         """Mean radiance of the groups, whose `lanes` these are, without the constant part, then its derivatives:
         (samples, g, 3, 1 + K). `pictures` may stand in for those that a graph gives at the vector, and `growth` says by
         what light that returns to the target has grown, which is then the last of the lanes' arrays."""
-        width = self._width
+        width = self.width
         theta = own_memory(vector, mi.Float)
         if pictures is None:
             varying = self._varying
@@ -128,7 +128,7 @@ class RecordedJacobian:
         return groups.add_parts(out.numpy().reshape(-1, 3, width))
 
     def _kernel(self, theta, constants, pictures, arrays, growth, start, stop, step, scale, out):
-        width = self._width
+        width = self.width
         factors = self._factors(growth[0]) if growth else []
 
         def body(lane, stop, sums):
@@ -173,8 +173,8 @@ class RecordedJacobian:
     def _factors(self, growth) -> list[mi.Color3f]:
         """By how much light that returns has grown, and the derivatives of that."""
         return [
-            mi.Color3f(*(dr.gather(mi.Float, growth, mi.UInt32(channel * self._width + k)) for channel in range(3)))
-            for k in range(self._width)
+            mi.Color3f(*(dr.gather(mi.Float, growth, mi.UInt32(channel * self.width + k)) for channel in range(3)))
+            for k in range(self.width)
         ]
 
     def _grown(self, weight, returned, factors):

@@ -50,6 +50,7 @@ class ReturnedGrowth:
             return
         assert paths.vector is not None
         self._lanes, self._group = _albedo_lanes(paths, held)
+        self._as_it_is = (own_memory(np.eye(1, image.width).repeat(3, axis=0).ravel(), mi.Float),)
         self._known = np.maximum(self._albedo(paths.vector)[:, :1], LEAST_ALBEDO)
 
     def __call__(self, vector: NDArray[np.float64], pictures: tuple[Any, ...] | None = None) -> tuple[mi.Float, ...]:
@@ -79,22 +80,27 @@ class ReturnedGrowth:
 
     def _albedo(self, vector: NDArray[np.float64], pictures: tuple[Any, ...] | None = None) -> NDArray[np.float64]:
         """The albedo of each channel and its derivatives, (3, 1 + K)."""
-        return self._image(vector, self._lanes, self._group, pictures)[0, 0].astype(np.float64)
+        return self._image(vector, self._lanes, self._group, pictures, self._as_it_is)[0, 0].astype(np.float64)
 
 
 def _albedo_lanes(paths: RecordedPaths, held: Sequence[str]) -> tuple[Lanes, LaneGroups]:
-    """Lanes whose sum is an albedo, with values that textures give at evenly spread lanes of a recording."""
+    """Lanes whose sum is an albedo, with values that textures give at evenly spread lanes of a recording.
+
+    No light returns in them, and their kernel is that of lanes where some does.
+    """
     number, zero = dr.arange(mi.UInt32, ALBEDO_LANES), dr.zeros(mi.UInt32, ALBEDO_LANES)
     wi = mi.warp.square_to_cosine_hemisphere(mi.Point2f(*even_points(2, number, zero, 1, 0)))
     lobe, *u = even_points(3, number, zero, 1, 1)
     proposal = DefensiveProposal()
     wo = proposal.sample(wi, lobe, mi.Point2f(*u))
     density = proposal.density(wi, wo)
-    weight = mi.Color3f(dr.select(density > 0.0, 1.0 / (ALBEDO_LANES * density), 0.0))
+    likely = dr.select(density > 0.0, ALBEDO_LANES * density, dr.inf)
+    # an array for each channel, as in recordings: one for all would be another kernel
+    weight, nothing = (mi.Color3f(*(dr.opaque(mi.Float, n) / likely for _ in range(3))) for n in (1.0, 0.0))
     place = own_memory(np.linspace(0, paths.lanes - 1, ALBEDO_LANES).astype(np.uint32), mi.UInt32)
     values = tuple(dr.gather(type(paths.held[name]), paths.held[name], place) for name in held)
-    dr.eval(wi, wo, weight, values)
+    dr.eval(wi, wo, weight, values, nothing)
     first = np.zeros(1, np.int64)
     group = LaneGroups(first, np.arange(2), first, np.array([[0, ALBEDO_LANES]]))
     start, stop, _ = group.parts
-    return Lanes((wi, wo, weight, *values), start, stop, dr.opaque(mi.UInt32, 1)), group
+    return Lanes((wi, wo, weight, *values, nothing), start, stop, dr.opaque(mi.UInt32, 1)), group

@@ -338,7 +338,10 @@ def test_what_one_output_gives_is_baked_once_and_of_what_shines_the_light_alone(
     nodes.tree.links.new(glow.outputs[0], added.inputs[1])
     nodes.tree.links.new(added.outputs[0], nodes.surface)
     depsgraph = bpy.context.evaluated_depsgraph_get()
-    instance = SimpleNamespace(object=ball.evaluated_get(depsgraph), matrix_world=ball.matrix_world, is_instance=False)
+    evaluated = ball.evaluated_get(depsgraph)
+    instance = SimpleNamespace(
+        object=evaluated, matrix_world=ball.matrix_world, is_instance=False, particle_system=None
+    )
     (leaf,) = surface.baked_surface(bpy.context.scene, instance, depsgraph, 0, tmp_path, 64, "scattered")["leaves"]
     assert len(baked) == 4
     sockets = leaf["sockets"]
