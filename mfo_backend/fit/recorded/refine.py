@@ -23,7 +23,9 @@ from .start import Started
 from .where_to_look import all_groups, fewer_groups, finer_grid, solution_grid
 
 EVALUATIONS_EXACT = 15
-MOST_RECORDINGS = 5  # at the solution, until it holds still
+# At the solution, until it holds still. Of 12 targets that light themselves none makes more than four
+# (docs/notebook/recorded_paths.md). Smaller: what moves far ends beside the truth
+MOST_RECORDINGS = 5
 # After a solve its recording is too old if the tiles changed by this share, or if its own noise grew by this factor.
 # The first is what mends fits that began far away, though most of those keep their samples; the second finds a lobe
 # that became narrow in few tiles.

@@ -13,7 +13,17 @@ from ...render.paths.recorded_paths import LaneGroups
 from ...render.paths.recorded_scene import MOST_LANES
 from ...types.errors import UnrecordableError
 from ..result.course import Stage
-from ..search.global_start import ROUGHER_WIDTH, agreeing_ends, best_starts, random_start, scan
+from ..search.global_start import (
+    FILM_BEGINS,
+    FILM_STARTS,
+    ROUGHER_WIDTH,
+    agreeing_ends,
+    best_starts,
+    different_nodes,
+    random_start,
+    scan,
+    scan_film,
+)
 from ..search.race_starts import race
 from ..squares.problem import Problem
 from ..squares.residuals import log_residual
@@ -118,4 +128,5 @@ def _starts(setting: Setting, problem: Problem, stage: Stage, values: Placed) ->
     if not starts and plan.scan:
         nodes = scan(setting.course.watch(stage, problem.equations), table, scanned)
         starts = [placed(start, values) for start in best_starts(nodes, plan.starts)]
-    return starts
+    films = scan_film(setting.course.watch(stage, problem.equations), table, starts[:FILM_BEGINS])
+    return starts + [node.x for node in different_nodes(films, FILM_STARTS)]

@@ -40,5 +40,7 @@ def indirect_share(
             return 0.0
         lit = mi.luminance(paths.weight) * dr.abs(paths.wo.z)
         with_others = dr.arange(mi.UInt32, paths.lanes) >= dr.opaque(mi.UInt32, int(paths.first[1, 0]))
-        everything, direct = (float(dr.sum(dr.select(some, lit, 0.0))[0]) for some in (with_others, ~with_others))
+        parts = [dr.select(some, lit, 0.0) for some in (with_others, ~with_others)]
+        dr.eval(parts)  # at once
+        everything, direct = (float(dr.sum(part)[0]) for part in parts)
     return (everything - direct) / max(direct, 1e-30)

@@ -57,8 +57,8 @@ def recorded_background(
     index = dr.compress(traced)
     if dr.width(index) > 0:
         sampler, ray = fresh_sampler(seed, dr.width(index)), ends.onward(rays.ray(index), index)
-        add(index, traced_radiance(scene, sampler, ray, light_paths, depth, hide=hide_emitters, walked=True))
-        add(index, seen_from_below(scene, ray, sampler, light_paths, depth))
+        radiance = traced_radiance(scene, sampler, ray, light_paths, depth, hide=hide_emitters, walked=True)
+        add(index, radiance + seen_from_below(scene, ray, sampler, light_paths, depth))
         if lamps.seen and ends.gone is not None:
             before_holes = dr.zeros(mi.SurfaceInteraction3f, dr.width(index))
             before_holes.t = dr.gather(mi.Float, ends.gone, index)

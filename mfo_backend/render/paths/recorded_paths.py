@@ -166,7 +166,7 @@ class ReturnedLight:
     share: NDArray[np.float64]
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class RecordedPaths:
     """All lanes of one recording, ordered by tile, then pixel.
 
@@ -225,6 +225,11 @@ class RecordedPaths:
     def interior(self) -> NDArray[np.bool_]:
         """Covered pixels without background in them."""
         return self.coverage > 0.999
+
+    def constant_of(self, groups: LaneGroups) -> tuple[NDArray[np.float32], NDArray[np.float32] | None]:
+        """The part of the image of the groups that no value changes, and half the difference of two samples of it."""
+        apart = self.constant_difference
+        return groups.average(self.constant), None if apart is None else groups.average(apart)
 
     def pixel_groups(self, keep: NDArray[np.bool_] | None = None) -> LaneGroups:
         """One group for each covered pixel, or for those in `keep`."""

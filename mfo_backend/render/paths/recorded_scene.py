@@ -12,6 +12,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property, partial
 from typing import Any
+from weakref import WeakKeyDictionary
 
 import mitsuba as mi
 import numpy as np
@@ -101,6 +102,7 @@ class RecordedScene:
             raise UnrecordableError("The camera sees the target through glass.")
         self.renderer = renderer
         self._covered, self._part, self._counts = covered, part, counts
+        self._growths: WeakKeyDictionary[RecordedPaths, ReturnedGrowth] = WeakKeyDictionary()
         self._taken = 0  # bytes for the rays of the largest recording so far
         self._mixed = hasattr(renderer.shape.bsdf(), "held_value")
         glow = renderer.shape.emitter() if renderer.shape.is_emitter() else None
@@ -306,9 +308,9 @@ class RecordedScene:
 
         It remembers two: solutions are compared in pairs.
         """
-        constant = _constant(paths, groups)
+        constant = paths.constant_of(groups)
         lanes, cost = Lanes.as_recorded(paths, groups, self._held), self._share(groups)
-        growth = ReturnedGrowth(paths, self._image, self._held)
+        growth = partial(self._growth(paths), self._image)
 
         def at(vector: NDArray[np.float64]) -> TwoSamples:
             self.renderer.counter.add(cost)
@@ -318,7 +320,12 @@ class RecordedScene:
 
     def returned_change(self, paths: RecordedPaths, vector: NDArray[np.float64]) -> float:
         """The part of all light by which that has changed which returns to the target, since it was recorded."""
-        return ReturnedGrowth(paths, self._image, self._held).change(vector)
+        return self._growth(paths).change(self._image, vector)
+
+    def _growth(self, paths: RecordedPaths) -> ReturnedGrowth:
+        if paths not in self._growths:
+            self._growths[paths] = ReturnedGrowth(paths, self._held)
+        return self._growths[paths]
 
     def images_of(
         self, paths: RecordedPaths, groups: LaneGroups, vector: NDArray[np.float64]
@@ -327,7 +334,7 @@ class RecordedScene:
         constant, varying = groups.average(paths.constant), self._evaluated
         assert varying is not None
         lanes, cost = Lanes.as_recorded(paths, groups, self._held), self._share(groups)
-        growth = ReturnedGrowth(paths, self._image, self._held)
+        growth = partial(self._growth(paths), self._image)
 
         def at(pictures: Mapping[str, NDArray[np.float32]]) -> NDArray[np.float32]:
             self.renderer.counter.add(cost)
@@ -349,14 +356,13 @@ class RecordedScene:
 
         With `coarser` by pictures of half the fineness of what a graph gives.
         """
-        constant = _constant(paths, groups)
+        constant = paths.constant_of(groups)
         lanes = LaneReader(Lanes.as_recorded(paths, groups, self._held))
         cost = with_derivatives(self._share(groups), self.renderer.table.length)
-        varying = self._evaluated if coarser else None
-        growth = ReturnedGrowth(paths, self.jacobian, self._held)
+        growth, varying = partial(self._growth(paths), self.jacobian), self._evaluated
 
         def at(vector: NDArray[np.float64]) -> TwoSamples:
-            arrays = varying and varying.coarser_arrays(vector)
+            arrays = varying.coarser_arrays(vector) if coarser and varying is not None else None
             samples = self.jacobian(vector, lanes(), groups, arrays, growth(vector, arrays))
             self.renderer.counter.add(cost)
             return TwoSamples.of(samples, *constant)
@@ -383,12 +389,6 @@ class RecordedScene:
     def _value(self, vector: NDArray[np.float64], name: str) -> Value | None:
         table = self.renderer.table
         return table.unpack(vector)[name] if name in table.names else self._fixed.get(name)
-
-
-def _constant(paths: RecordedPaths, groups: LaneGroups) -> tuple[NDArray[np.float32], NDArray[np.float32] | None]:
-    """The part of the image of the groups that no value changes, and half the difference of two samples of it."""
-    apart = paths.constant_difference
-    return groups.average(paths.constant), None if apart is None else groups.average(apart)
 
 
 def _rays(squares: NDArray[np.int64], stride: int) -> int:

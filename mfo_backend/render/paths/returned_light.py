@@ -39,48 +39,51 @@ LEAST_ALBEDO = 1e-4  # for a division: what a blacker target reflects shows noth
 
 
 class ReturnedGrowth:
-    """The factor (a(x) / a(x_0))^m of a recording's light that returns, with derivatives where `image` has them.
+    """The factor (a(x) / a(x_0))^m of a recording's light that returns, with derivatives where an image has them.
 
     The albedo is that for light from all sides: a mean over pairs of directions, and over places of the recording.
     """
 
-    def __init__(self, paths: RecordedPaths, image: RecordedJacobian, held: Sequence[str]) -> None:
-        self._image, self._returned = image, paths.returned
-        if self._returned is None:
-            return
-        assert paths.vector is not None
-        self._lanes, self._group = _albedo_lanes(paths, held)
-        self._as_it_is = (own_memory(np.eye(1, image.width).repeat(3, axis=0).ravel(), mi.Float),)
-        self._known = np.maximum(self._albedo(paths.vector)[:, :1], LEAST_ALBEDO)
+    def __init__(self, paths: RecordedPaths, held: Sequence[str]) -> None:
+        self._known: NDArray[np.float64] | None = None
+        self._order = None if paths.returned is None else paths.returned.order[:, None]
+        if paths.returned is not None:
+            self._share, self._vector = paths.returned.share, paths.vector
+            self._lanes, self._group = _albedo_lanes(paths, held)
 
-    def __call__(self, vector: NDArray[np.float64], pictures: tuple[Any, ...] | None = None) -> tuple[mi.Float, ...]:
+    def __call__(
+        self, image: RecordedJacobian, vector: NDArray[np.float64], pictures: tuple[Any, ...] | None = None
+    ) -> tuple[mi.Float, ...]:
         """The factor and its derivatives, 3 (1 + K) numbers channel by channel, or nothing where no light returns.
 
         `pictures` may stand in for those that a graph gives at the vector.
         """
-        factor = self._factor(vector, pictures)
+        factor = self._factor(image, vector, pictures)
         return () if factor is None else (own_memory(factor.ravel(), mi.Float),)
 
-    def change(self, vector: NDArray[np.float64]) -> float:
+    def change(self, image: RecordedJacobian, vector: NDArray[np.float64]) -> float:
         """The part of all light by which what returns has changed, in the channel where it is most."""
-        factor = self._factor(vector)
-        if factor is None or self._returned is None:
-            return 0.0
-        return float(np.max(self._returned.share * np.abs(factor[:, 0] - 1.0)))
+        factor = self._factor(image, vector, None)
+        return 0.0 if factor is None else float(np.max(self._share * np.abs(factor[:, 0] - 1.0)))
 
     def _factor(
-        self, vector: NDArray[np.float64], pictures: tuple[Any, ...] | None = None
+        self, image: RecordedJacobian, vector: NDArray[np.float64], pictures: tuple[Any, ...] | None
     ) -> NDArray[np.float64] | None:
         """The factor of each channel and its derivatives, (3, 1 + K)."""
-        if self._returned is None:
+        if self._order is None:
             return None
-        order, ratio = self._returned.order[:, None], self._albedo(vector, pictures) / self._known
+        if self._known is None:
+            self._known = np.maximum(self._albedo(image, self._vector, None)[:, :1], LEAST_ALBEDO)
+        ratio = self._albedo(image, vector, pictures) / self._known
         here = np.maximum(ratio[:, :1], LEAST_ALBEDO)
-        return np.concatenate([here**order, order * here ** (order - 1.0) * ratio[:, 1:]], axis=1)
+        return np.concatenate([here**self._order, self._order * here ** (self._order - 1.0) * ratio[:, 1:]], axis=1)
 
-    def _albedo(self, vector: NDArray[np.float64], pictures: tuple[Any, ...] | None = None) -> NDArray[np.float64]:
+    def _albedo(
+        self, image: RecordedJacobian, vector: NDArray[np.float64], pictures: tuple[Any, ...] | None
+    ) -> NDArray[np.float64]:
         """The albedo of each channel and its derivatives, (3, 1 + K)."""
-        return self._image(vector, self._lanes, self._group, pictures, self._as_it_is)[0, 0].astype(np.float64)
+        as_it_is = own_memory(np.eye(1, image.width).repeat(3, axis=0).ravel(), mi.Float)
+        return image(vector, self._lanes, self._group, pictures, (as_it_is,))[0, 0].astype(np.float64)
 
 
 def _albedo_lanes(paths: RecordedPaths, held: Sequence[str]) -> tuple[Lanes, LaneGroups]:

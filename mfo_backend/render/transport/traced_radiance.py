@@ -48,30 +48,20 @@ def traced_radiance(
     Further arguments are those of `cycles_path`: `before` is the density and weight of a bounce the ray comes from.
     With what it has `met`, the emission of that is left out.
     """
-    return _traced(scene, sampler, ray, light_paths, depth, hide=hide, **further)[0]
+    tracer = _tracer(scene, light_paths, depth, hide=hide, after_bounce="before" in further)
+    return tracer.sample(dr.ADMode.Primal, scene, sampler, ray, **further)[0]
 
 
-def _traced(
-    scene: mi.Scene,
-    sampler: mi.Sampler,
-    ray: mi.Ray3f,
-    light_paths: LightPaths | None,
-    depth: int,
-    *,
-    hide: bool = False,
-    **further: Any,
-) -> tuple[mi.Color3f, list[mi.Color3f]]:
-    """`traced_radiance`, and what `cycles_path` tells of a target that is among the `further` arguments."""
+def _tracer(scene: mi.Scene, light_paths: LightPaths | None, depth: int, *, hide: bool, after_bounce: bool) -> Any:
+    """The integrator `cycles_path`; what rays straight from the camera see behind everything is no light of others."""
     from .cycles_path import PLUGIN_NAME, light_path_properties, register  # can be imported when a variant is set
 
     register()
     properties: dict[str, Any] = {"type": PLUGIN_NAME, "max_depth": depth, "hide_emitters": hide}
     camera_world = getattr(scene.integrator(), "camera_world", None)
-    if camera_world is not None and further.get("before") is None:
+    if camera_world is not None and not after_bounce:
         properties["camera_world"] = camera_world
-    integrator = mi.load_dict(properties | light_path_properties(light_paths or LightPaths()))
-    radiance, _, told, _ = integrator.sample(dr.ADMode.Primal, scene, sampler, ray, **further)
-    return radiance, told
+    return mi.load_dict(properties | light_path_properties(light_paths or LightPaths()))
 
 
 def tells_rays(scene: mi.Scene, target: Any, light_paths: LightPaths | None) -> bool:
@@ -100,9 +90,11 @@ def sent_on(
     bsdf, pointer = target.bsdf(), mi.ShapePtr(target)
     dr.make_opaque(pointer)  # its number in this process is no part of the kernel
 
+    tracer = _tracer(scene, light_paths, depth, hide=False, after_bounce=light_paths is not None)
+
     def traced(**further: Any) -> SentOn:
         further |= {"met": met, "target": pointer, "went_through": si.wi.z * wo.z < 0.0}
-        radiance, told = _traced(scene, sampler, ray, light_paths, depth, **further)
+        radiance, _, told, _ = tracer.sample(dr.ADMode.Primal, scene, sampler, ray, **further)
         return SentOn(radiance, *told)
 
     if light_paths is None:

@@ -318,8 +318,7 @@ def test_glow_below_zero_is_refused(tmp_path: Path) -> None:
 def test_what_one_output_gives_is_baked_once_and_of_what_shines_the_light_alone(
     stage: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """A picture in a group that many sockets take, and a glow beside: four bakes are the light, where faces are, and
-    the picture as a colour and as a number."""
+    """A group that many sockets take, beside a glow: four bakes are the light, the faces, a colour and a number."""
     from blender_addon.bake import surface
 
     baked, bake = [], surface.bake
@@ -327,8 +326,8 @@ def test_what_one_output_gives_is_baked_once_and_of_what_shines_the_light_alone(
     _, ball, nodes = stage
     group = bpy.data.node_groups.new("Picture", "ShaderNodeTree")
     group.interface.new_socket("Colour", in_out="OUTPUT", socket_type="NodeSocketColor")
-    inside = group.nodes.new("ShaderNodeTexNoise")
-    group.links.new(inside.outputs["Color"], group.nodes.new("NodeGroupOutput").inputs[0])
+    noise = group.nodes.new("ShaderNodeTexNoise").outputs["Color"]
+    group.links.new(noise, group.nodes.new("NodeGroupOutput").inputs[0])
     picture, glow, added = nodes.new("Group"), nodes.new("Emission"), nodes.new("AddShader")
     picture.node_tree = group
     for socket in ("Base Color", "Specular Tint", "Sheen Tint", "Roughness", "Metallic"):
@@ -338,10 +337,8 @@ def test_what_one_output_gives_is_baked_once_and_of_what_shines_the_light_alone(
     nodes.tree.links.new(glow.outputs[0], added.inputs[1])
     nodes.tree.links.new(added.outputs[0], nodes.surface)
     depsgraph = bpy.context.evaluated_depsgraph_get()
-    evaluated = ball.evaluated_get(depsgraph)
-    instance = SimpleNamespace(
-        object=evaluated, matrix_world=ball.matrix_world, is_instance=False, particle_system=None
-    )
+    shown = {"object": ball.evaluated_get(depsgraph), "matrix_world": ball.matrix_world}
+    instance = SimpleNamespace(**shown, is_instance=False, particle_system=None)
     (leaf,) = surface.baked_surface(bpy.context.scene, instance, depsgraph, 0, tmp_path, 64, "scattered")["leaves"]
     assert len(baked) == 4
     sockets = leaf["sockets"]

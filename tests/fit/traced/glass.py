@@ -25,12 +25,12 @@ def load(folder, names=NAMES, sockets=None, lights=SKY + AREA + FLOOR, origin=OR
     return load_renderer(path, "target", model="blender_principled", parameters=names, materials=materials)
 
 
-def fit(renderer, reference, *, preset="fast", stop=lambda: False):
+def fit(renderer, reference, *, preset="fast", stop=lambda: False, seed=0):
     events = []
     outcome = recover_material(
         renderer,
         Image(reference, Encoding.LINEAR),
-        FitSettings(model="blender_principled", preset=preset, verify_spp=32),
+        FitSettings(model="blender_principled", preset=preset, verify_spp=32, seed=seed),
         listener=events.append,
         should_stop=stop,
     )
