@@ -354,7 +354,7 @@ def _all() -> Iterator[Setting]:
     yield Setting("lamp of an instancer", _lamp_of_instancer())
     yield Setting("lamp's instancer hidden from camera", _lamp_of_instancer(visible_camera=False))
     yield Setting("lamp's instancer hidden from diffuse", _lamp_of_instancer(visible_diffuse=False), ("hidden from",))
-    yield Setting("lamp indirect only", _lamp_of_collection("indirect_only", 1.4))
+    yield Setting("lamp indirect only", _lamp_of_collection("indirect_only", 0.2))
     yield Setting("lamp in a holdout collection", _lamp_of_collection("holdout", -1.4))
     yield Setting("mesh light linking", _linked_mesh("receiver_collection"), ("Light linking",))
     yield Setting("mesh shadow linking", _linked_mesh("blocker_collection"), ("Light linking",))

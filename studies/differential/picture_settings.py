@@ -175,8 +175,10 @@ def _without_map(rig: Rig, draw: Draw) -> None:
 
 def _all() -> Iterator[Setting]:
     for owner in ("floor", "box", "target"):
-        yield Setting(f"picture on the {owner}", _picture_on(owner))
-        yield Setting(f"numbers on the {owner}", _numbers(owner))
+        # of a target with holes, which pictures by Box show mirrored on its backs
+        sides = ("tell its sides",) if owner == "target" else ()
+        yield Setting(f"picture on the {owner}", _picture_on(owner), sides)
+        yield Setting(f"numbers on the {owner}", _numbers(owner), sides)
         yield Setting(f"mask on the {owner}", _mask(owner))
         yield Setting(f"beyond bounds on the {owner}", _beyond(owner))
     yield Setting("map of the instancer", _from_instancer, ("of each instance",))
