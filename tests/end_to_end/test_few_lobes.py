@@ -33,6 +33,10 @@ GLAZE |= {"Coat Roughness": 0.06, "Coat Tint": (0.35, 0.6, 0.75, 1.0)}
 LIGHT_GREY = {"Base Color": (0.8, 0.8, 0.8, 1.0), "Coat Weight": 0.5, "Coat Tint": (0.9, 0.9, 0.9, 1.0)}
 BAUBLE = {"Base Color": (0.8, 0.8, 0.82, 1.0), "Metallic": 1.0, "Roughness": 0.3, "Thin Film Thickness": 420.0}
 BAUBLE |= {"Thin Film IOR": 1.5}
+STEEL = {"Base Color": (0.55, 0.65, 0.6, 1.0), "Metallic": 1.0, "Roughness": 0.45, "Anisotropic": 0.67}
+STEEL |= {"Anisotropic Rotation": 0.285}  # across the direction of none
+BLENDERS = {"Base Color": (0.8, 0.8, 0.8, 1.0), "Metallic": 0.0, "Roughness": 0.5, "Anisotropic": 0.0}
+BLENDERS |= {"Anisotropic Rotation": 0.0}
 NO_FILM = {"Base Color": (0.5, 0.5, 0.5, 1.0), "Metallic": 0.5, "Roughness": 0.5, "Thin Film Thickness": 0.0}
 
 
@@ -66,6 +70,17 @@ def test_a_film_is_found_where_the_scene_has_none(found: Callable[..., dict[str,
     # a lamp's highlight does not tell the order of its colours
     assert answer["certainty"]["thin_film_thickness"]["level"] == "not_told_apart"
     assert abs(answer["recovered"]["thin_film_ior"] - BAUBLE["Thin Film IOR"]) < 0.1
+
+
+def test_a_brushed_metal_is_found_where_the_scene_has_none(found: Callable[..., dict[str, Any]]) -> None:
+    """It was *close*, and a note named what was 0."""
+    answer = found(STEEL, BLENDERS)
+    assert any("one that is brushed" in note for note in answer["notes"])
+    recovered = answer["recovered"]
+    np.testing.assert_allclose(recovered["base_color"], STEEL["Base Color"][:3], atol=0.02)
+    assert abs(recovered["roughness"] - STEEL["Roughness"]) < 0.04
+    assert abs(recovered["anisotropic"] - STEEL["Anisotropic"]) < 0.1
+    assert abs(recovered["anisotropic_rotation"] - STEEL["Anisotropic Rotation"]) < 0.02
 
 
 METAL = """

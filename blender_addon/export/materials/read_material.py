@@ -273,12 +273,15 @@ def with_default_tangent(material: Material, *, is_fitted: bool = False) -> Mate
     """The target's leaf, whose Tangent circles the object's Z axis where it has no link and highlights turn along it.
 
     The mesh holds it, or Cycles evaluates it. `is_fitted` says that a fit changes the anisotropy, which may be zero.
+    What a mesh holds is told in any case, for a fit may begin again from a brushed surface.
     """
     tangent, amount = (material.sockets.get(name) for name in ("Tangent", "Anisotropic"))
-    if tangent is None or tangent.linked or amount is None or not (is_fitted or amount.varies or amount.value):
+    if tangent is None or tangent.linked or amount is None:
         return material
-    by_mesh = bool(material.circling)
-    given = replace(tangent, by_graph=not by_mesh, by_mesh=by_mesh, linked=True)
+    by_mesh, turns = bool(material.circling), bool(is_fitted or amount.varies or amount.value)
+    if not (by_mesh or turns):
+        return material
+    given = replace(tangent, by_graph=turns and not by_mesh, by_mesh=by_mesh, linked=turns)
     return replace(material, sockets=material.sockets | {"Tangent": given})
 
 

@@ -71,6 +71,7 @@ FIT = {
     "of glass": "en verre",
     "under a tinted coat": "sous un vernis teinté",
     "under a thin film": "sous un film mince",
+    "brushed": "brossé",
     "as rough as clay": "rugueux comme l'argile",
     "cut out": "découpé",
     "opaque": "opaque",

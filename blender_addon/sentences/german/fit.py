@@ -71,6 +71,7 @@ FIT = {
     "of glass": "aus Glas",
     "under a tinted coat": "mit getönter Klarlackschicht",
     "under a thin film": "unter einem dünnen Film",
+    "brushed": "gebürstet",
     "as rough as clay": "rau wie Ton",
     "cut out": "ausgeschnitten",
     "opaque": "undurchsichtig",

@@ -14,15 +14,16 @@ from ...render.paths.recorded_scene import MOST_LANES
 from ...types.errors import UnrecordableError
 from ..result.course import Stage
 from ..search.global_start import (
-    FILM_BEGINS,
-    FILM_STARTS,
+    FURTHER_LOBES,
+    LOBE_BEGINS,
+    LOBE_STARTS,
     ROUGHER_WIDTH,
     agreeing_ends,
     best_starts,
     different_nodes,
     random_start,
     scan,
-    scan_film,
+    scan_lobe,
 )
 from ..search.race_starts import race
 from ..squares.problem import Problem
@@ -128,5 +129,8 @@ def _starts(setting: Setting, problem: Problem, stage: Stage, values: Placed) ->
     if not starts and plan.scan:
         nodes = scan(setting.course.watch(stage, problem.equations), table, scanned)
         starts = [placed(start, values) for start in best_starts(nodes, plan.starts)]
-    films = scan_film(setting.course.watch(stage, problem.equations), table, starts[:FILM_BEGINS])
-    return starts + [node.x for node in different_nodes(films, FILM_STARTS)]
+    begins, residuals = starts[:LOBE_BEGINS], setting.course.watch(stage, problem.equations)
+    for lobe in FURTHER_LOBES:
+        nodes = scan_lobe(residuals, table, lobe, begins)
+        starts += [node.x for node in different_nodes(nodes, LOBE_STARTS)]
+    return starts

@@ -95,7 +95,9 @@ def absent_notes(request: Request, result: FitResult) -> tuple[str, ...]:
         return ()
     if judgement is None or judgement.verdict is Verdict.SAME or judgement.cause is not Cause.MATERIAL:
         return ()
-    names = [SOCKET_OF_PARAMETER[name] for name in ASKED_FOR if name not in result.recovered]
+    tangent = material.sockets.get("Tangent")
+    tried = {"anisotropic"} if tangent is not None and tangent.mesh and not material.leaves else set()
+    names = [SOCKET_OF_PARAMETER[name] for name in ASKED_FOR if name not in {*result.recovered, *tried}]
     own = {name: material.sockets[name] for name in names if name in material.sockets}
     for leaf in material.leaves:  # a fit of `all` gives these to the fitted one alone
         layers = [SOCKET_OF_PARAMETER[name] for name in LAYERS_OF_ONE if leaf.free]

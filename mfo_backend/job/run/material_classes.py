@@ -32,6 +32,7 @@ CUT_OUT = {"Alpha": 0.5, "Transmission Weight": 0.0}
 OPAQUE = {"Transmission Weight": 0.0, "Alpha": 1.0}
 TINTED = OPAQUE | {"Coat Weight": 0.5, "Coat Tint": [0.5, 0.5, 0.5]}
 FILMED = OPAQUE | {"Thin Film Thickness": 400.0}  # nanometres, where the first colours are
+BRUSHED = OPAQUE | {"Anisotropic": 0.7}
 CLAY = OPAQUE | {"Diffuse Roughness": 0.5}
 GLOWING = OPAQUE | {"Emission Color": [0.5, 0.5, 0.5]}
 _OF_GLASS = ("transmission_weight", "ior")
@@ -98,6 +99,7 @@ def _or(classes: Sequence[MaterialClass]) -> str:
 
 # What an opaque material may have more of, by the value that is without effect in the scene
 _FURTHER = {
+    "anisotropic": MaterialClass("brushed", BRUSHED, ("anisotropic", "anisotropic_rotation"), _OF_GLASS, further=True),
     "coat_tint": MaterialClass("under a tinted coat", TINTED, ("coat_tint",), _OF_GLASS, further=True),
     "thin_film_thickness": MaterialClass(
         "under a thin film", FILMED, ("thin_film_thickness", "thin_film_ior"), _OF_GLASS, further=True
@@ -141,13 +143,20 @@ def other_classes(material: Mapping[str, Any], glow: float) -> list[MaterialClas
     own = _class_of(sockets)
     quick = [_glowing(material, glow)] if glow > 0.0 else []
     if own == "opaque":
-        quick += [further for name, further in _FURTHER.items() if value_of(material, name) == PLAIN.get(name, 0.0)]
+        lacks = [name for name in _FURTHER if value_of(material, name) == PLAIN.get(name, 0.0)]
+        quick += [_FURTHER[name] for name in lacks if name != "anisotropic" or _has_tangents(sockets)]
     classes = sorted((*quick, *_CLASSES), key=lambda other: other.name != own)
     return [
         other for other in classes
         if (other.name != own or other.also)
         and not any(sockets.get(name, {}).get("linked") for name in other.sockets)
     ]  # fmt: skip
+
+
+def _has_tangents(sockets: Mapping[str, Any]) -> bool:
+    """Whether the meshes hold tangents, along which nothing is stretched yet."""
+    tangent = sockets.get("Tangent", {})
+    return bool(tangent.get("mesh")) and not tangent.get("linked")
 
 
 def _class_of(sockets: Mapping[str, Any]) -> str:
@@ -167,6 +176,8 @@ def changed(material: Mapping[str, Any], to: MaterialClass) -> dict[str, Any]:
     other = copy.deepcopy(dict(material))
     for name, value in to.sockets.items():
         other["sockets"].setdefault(name, {})["value"] = value
+    if "Anisotropic" in to.sockets:
+        other["sockets"]["Tangent"]["linked"] = True
     return other
 
 

@@ -62,7 +62,7 @@ def blender_principled_dict(
                 "map": picture(content),
                 "turned": bool(content.get("turned")),
             }
-        if socket == "Tangent" and content.get("mesh"):
+        if socket == "Tangent" and content.get("mesh") and (content.get("linked") or _turns_highlights(sockets)):
             result[DIRECTIONS[socket]] = {"type": "mesh_attribute", "name": MESH_TANGENT}
         if socket in _IGNORED or socket in DIRECTIONS:
             continue
@@ -80,6 +80,11 @@ def blender_principled_dict(
         if components != default or item.name in free:
             result[item.name] = {"type": "rgb", "value": list(components)} if item.size == 3 else components[0]
     return result
+
+
+def _turns_highlights(sockets: Mapping[str, Mapping[str, Any]]) -> bool:
+    amount = sockets.get("Anisotropic", {})
+    return bool(amount.get("linked") or amount.get("value"))
 
 
 def closure_tree_dict(

@@ -95,4 +95,5 @@ def test_other_meshes_hold_no_tangents(scene: Any, export: Any) -> None:
     assert b"tangent_x" in of_target  # whose anisotropy a fit may find
     assert b"tangent_x" not in of_other
     check_ply(report.folder / "meshes/target.ply")
-    assert report.request["materials"]["target_bsdf"]["sockets"]["Tangent"] == {"value": [0.0] * 3, "linked": False}
+    tangent = {"value": [0.0] * 3, "linked": False, "mesh": True}
+    assert report.request["materials"]["target_bsdf"]["sockets"]["Tangent"] == tangent

@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 
 from mfo_backend.fit.search.global_start import (
+    BRUSHED,
     FILM,
-    FILM_INDEX,
     METAL,
     OPPOSITE_WIDTH,
     ROUGHER_WIDTH,
@@ -18,7 +18,7 @@ from mfo_backend.fit.search.global_start import (
     different_nodes,
     random_start,
     scan,
-    scan_film,
+    scan_lobe,
 )
 from mfo_backend.solve.bounded_least_squares import NormalEquations, Solution, solve_bounded
 from mfo_backend.types.parameter import Parameter, ParameterTable
@@ -157,12 +157,13 @@ def test_the_scan_finds_the_lower_basin():
     assert nodes[0].cost < 0.5 * 0.32**2  # 0.3 and a little left of its few steps
 
 
-FILMED = ParameterTable((*TABLE, Parameter(FILM, 1, 0.0, 1000.0, 300.0), Parameter(FILM_INDEX, 1, 1.0, 2.4, 1.33)))
+THICKNESS, INDEX = FILM
+FILMED = ParameterTable((*TABLE, Parameter(THICKNESS, 1, 0.0, 1000.0, 300.0), Parameter(INDEX, 1, 1.0, 2.4, 1.33)))
 
 
 def interference(x):
     """Three colours whose fringes depend on the film's optical thickness, and its index alone a little."""
-    d, n = x[FILMED.slice_of(FILM)][0], x[FILMED.slice_of(FILM_INDEX)][0]
+    d, n = x[FILMED.slice_of(THICKNESS)][0], x[FILMED.slice_of(INDEX)][0]
     return np.array([np.cos(4.0 * np.pi * d * n / wavelength) for wavelength in (610.0, 540.0, 450.0)] + [0.3 * n])
 
 
@@ -173,7 +174,7 @@ def test_a_film_is_found_among_the_orders_of_its_colours(thickness, index):
     def apart(x):
         return np.concatenate([interference(x) - interference(truth), x[:5] - truth[:5]])
 
-    nodes = scan_film(squares(apart), FILMED, [FILMED.begin])
+    nodes = scan_lobe(squares(apart), FILMED, FILM, [FILMED.begin])
     assert [node.cost for node in nodes] == sorted(node.cost for node in nodes)
     ends = [solve_bounded(squares(apart), node.x, FILMED.lower, FILMED.upper) for node in different_nodes(nodes, 4)]
     best = min(ends, key=lambda end: end.equations.cost)
@@ -183,9 +184,34 @@ def test_a_film_is_found_among_the_orders_of_its_colours(thickness, index):
     assert one.equations.cost > 10.0 * best.equations.cost + 1e-6
 
 
+STRETCHED = ParameterTable(
+    (
+        *TABLE,
+        Parameter("anisotropic", 1, 0.0, 1.0, 0.0),
+        Parameter("anisotropic_rotation", 1, 0.0, 1.0, 0.0, period=0.5),
+    )
+)
+
+
+@pytest.mark.parametrize("turn", [0.05, 0.2, 0.3, 0.45])
+def test_the_direction_of_a_brushed_surface_is_found(turn):
+    """Of a stretch along a line what shows are its size times the sine and cosine of twice the angle."""
+
+    def shown(x):
+        amount, angle = x[5], 4.0 * np.pi * x[6]
+        return np.array([amount * np.cos(angle), amount * np.sin(angle), 0.1 * amount])
+
+    truth = np.concatenate([np.full(5, 0.5), [0.8, turn]])
+    apart = squares(lambda x: np.concatenate([shown(x) - shown(truth), x[:5] - truth[:5]]))
+    best, *others = different_nodes(scan_lobe(apart, STRETCHED, BRUSHED, [STRETCHED.begin]), 4)
+    assert len(others) == 3
+    end = solve_bounded(apart, best.x, STRETCHED.lower, STRETCHED.upper)
+    np.testing.assert_allclose(end.x[5:], [0.8, turn], atol=1e-3)
+
+
 def test_beside_each_begin_all_nodes_of_a_film_are_tried():
     flat = [FILMED.begin, FILMED.lower]
-    nodes = scan_film(lambda x: NormalEquations(1.0, np.zeros(7), np.eye(7)), FILMED, flat)
+    nodes = scan_lobe(lambda x: NormalEquations(1.0, np.zeros(7), np.eye(7)), FILMED, FILM, flat)
     assert len(nodes) == 2 * len({node.held for node in nodes})
     assert {tuple(node.x[:5]) for node in nodes} == {tuple(begin[:5]) for begin in flat}
     assert {tuple(node.x[5:]) for node in nodes} == {node.held for node in nodes}
@@ -195,9 +221,9 @@ def test_without_a_film_nothing_of_one_is_tried():
     def never(x):
         raise AssertionError("no film to solve for")
 
-    assert scan_film(never, TABLE, [TABLE.begin]) == []
-    index_alone = ParameterTable((*TABLE, Parameter(FILM_INDEX, 1, 1.0, 2.4, 1.33)))
-    assert scan_film(never, index_alone, [index_alone.begin]) == []
+    assert scan_lobe(never, TABLE, FILM, [TABLE.begin]) == []
+    index_alone = ParameterTable((*TABLE, Parameter(INDEX, 1, 1.0, 2.4, 1.33)))
+    assert scan_lobe(never, index_alone, FILM, [index_alone.begin]) == []
 
 
 def test_best_starts_are_different_nodes_and_two_metals():

@@ -39,10 +39,16 @@ def test_nothing_is_said_where_it_is_the_same_or_nothing_stayed() -> None:
 
 
 def said_of_absent(
-    verdict: Verdict, cause: Cause | None, parameters: str | list[str], leaves: tuple[Any, ...] = ()
+    verdict: Verdict,
+    cause: Cause | None,
+    parameters: str | list[str],
+    leaves: tuple[Any, ...] = (),
+    *,
+    mesh: bool = False,
 ) -> tuple[str, ...]:
     amounts = {"Anisotropic": 0.0, "Thin Film Thickness": 420.0, "Subsurface Weight": 0.0, "Metallic": 0.0}
     sockets = {name: SimpleNamespace(value=value, linked=False) for name, value in amounts.items()}
+    sockets["Tangent"] = SimpleNamespace(value=0.0, linked=False, mesh=mesh)
     request: Any = SimpleNamespace(
         materials={"target_bsdf": SimpleNamespace(sockets=sockets, leaves=leaves)},
         target=SimpleNamespace(bsdf_id="target_bsdf", labels={}), fit=SimpleNamespace(parameters=parameters),
@@ -66,6 +72,11 @@ def test_what_the_material_has_none_of_is_named_where_it_does_not_match() -> Non
     )
     (said,) = said_of_absent(Verdict.CLOSE, Cause.MATERIAL, "all", leaves)
     assert "(Anisotropic, Subsurface Weight, Paint/Coat Weight)" in said
+    # a fit that began again from a brushed one has tried the first
+    (said,) = said_of_absent(Verdict.CLOSE, Cause.MATERIAL, "all", mesh=True)
+    assert "(Subsurface Weight)" in said
+    (said,) = said_of_absent(Verdict.CLOSE, Cause.MATERIAL, "all", leaves, mesh=True)  # a mix is tried as no other
+    assert "(Anisotropic, " in said
     assert said_of_absent(Verdict.CLOSE, Cause.LIGHT, "all") == ()
     assert said_of_absent(Verdict.SAME, None, "all") == ()
     assert said_of_absent(Verdict.CLOSE, Cause.MATERIAL, ["roughness"]) == ()

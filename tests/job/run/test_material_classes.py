@@ -53,6 +53,25 @@ def test_the_other_classes_are_tried(values, others):
     assert glowing == [*own, "glowing", *others[len(own) :]]
 
 
+def of_mesh(amount=0.0, *, linked=False):
+    """A material whose meshes hold tangents."""
+    own = material(Anisotropic=amount)
+    own["sockets"]["Tangent"] = {"value": [0.0] * 3, "linked": linked, "mesh": True}
+    return own
+
+
+def test_a_brushed_one_is_tried_where_the_meshes_hold_tangents():
+    plain = of_mesh()
+    brushed = named("brushed", plain)
+    assert "brushed" not in [other.name for other in other_classes(material(Anisotropic=0.0), 0.0)]
+    assert "brushed" not in [other.name for other in other_classes(of_mesh(0.3, linked=True), 0.0)]
+    again = changed(plain, brushed)
+    assert value_of(again, "anisotropic") > 0.5
+    assert again["sockets"]["Tangent"]["linked"]
+    assert not changed(plain, named("as rough as clay"))["sockets"]["Tangent"]["linked"]
+    assert parameters_of(brushed, ("roughness", "ior")) == ["roughness", "anisotropic", "anisotropic_rotation"]
+
+
 def test_a_class_begins_with_its_own_values_and_the_scenes_others():
     own = material(Metallic=0.6, Roughness=0.5, Coat_Weight=0.3)
     glass = changed(own, named("of glass", own))

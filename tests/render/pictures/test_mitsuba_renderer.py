@@ -177,6 +177,9 @@ def test_a_mesh_without_the_tangents_that_its_material_asks_for_is_refused(tmp_p
         load_renderer(
             path, "target", model="blender_principled", parameters=["roughness"], materials={"glaze": brushed}
         )
+    # of what turns nothing along them they are not read
+    brushed["sockets"]["Tangent"]["linked"] = False
+    load_renderer(path, "target", model="blender_principled", parameters=["roughness"], materials={"glaze": brushed})
 
 
 def test_fixed_values_stay_those_of_the_scene(tmp_path: Path) -> None:
