@@ -54,18 +54,21 @@ def normals_around(
     points: NDArray[np.float64], reach: NDArray[np.float64], mesh: TriangleMesh
 ) -> list[NDArray[np.float64]]:
     """The normals (k, 3) of the triangles of a mesh that each of some points (n, 3) lies in, nearer than its reach."""
-    found = [np.empty((0, 3)) for _ in points]
-    margin = reach.max()
-    low, high = points.min(axis=0) - margin, points.max(axis=0) + margin
-    if (mesh.positions.min(axis=0) > high).any() or (mesh.positions.max(axis=0) < low).any():
+    found = [np.empty((0, 3))] * len(points)
+    margin, least, most = reach[:, None], mesh.positions.min(axis=0), mesh.positions.max(axis=0)
+    # of thousands of small meshes, as a donut's sprinkles, each is at few of the points
+    inside = np.flatnonzero(((points + margin >= least) & (points - margin <= most)).all(axis=1))
+    if not len(inside):
         return found
+    low, high = (points - margin)[inside].min(axis=0), (points + margin)[inside].max(axis=0)
     near = mesh.triangles
     for axis in range(3):  # one after the other: of a million triangles that takes a tenth of the time
         values = mesh.positions[:, axis][near]
         near = near[(values.min(axis=1) <= high[axis]) & (values.max(axis=1) >= low[axis])]
     corners = mesh.positions[near]
     lowest, highest = (np.ascontiguousarray(ends.T) for ends in (corners.min(axis=1), corners.max(axis=1)))
-    for number, (point, own) in enumerate(zip(points, reach, strict=True)):
+    for number in inside.tolist():
+        point, own = points[number], float(reach[number])
         around = np.flatnonzero((lowest[0] <= point[0] + own) & (highest[0] >= point[0] - own))
         for axis in (1, 2):
             at, to = lowest[axis][around], highest[axis][around]

@@ -50,8 +50,11 @@ def note_coplanar_faces(
         low, high = points.min(axis=0) - reach.max(), points.max(axis=0) + reach.max()
         near = [place for place, (least, most) in zip(filled, bounds, strict=True) if _meet(low, high, least, most)]
         around = [(name, normals_around(points, reach, mesh)) for name, mesh in near]
-        planes = [np.concatenate([*each]) for each in zip(*(n for name, n in around if name == own), strict=True)]
-        found = [name for name, normals in around if most_parallel(planes or normals, normals) > (name == own)]
+        there = [(name, normals) for name, normals in around if any(map(len, normals))]
+        planes = [np.concatenate([*each]) for each in zip(*(n for name, n in there if name == own), strict=True)]
+        if not planes and any(name == own for name, _ in near):
+            continue  # no point lies in a face of its own object, so none lies in one of another's beside it
+        found = [name for name, normals in there if most_parallel(planes or normals, normals) > (name == own)]
         for other in dict.fromkeys(found):
             if other == own:
                 findings.note(_twice(own))

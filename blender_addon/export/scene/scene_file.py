@@ -6,7 +6,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 import numpy as np
@@ -33,6 +33,7 @@ from ..lights.light_model import irradiance_at
 from ..material_model import Texture
 from ..materials.material_elements import bsdf_element, emission_element
 from ..meshes.leaning_normals import normals_lean, share_of_mirrored
+from ..meshes.mesh_arrays import joined
 from .scene_data import SceneData, Shape, target_bsdf
 from .world_model import camera_world_element, world_element, world_irradiance
 
@@ -47,6 +48,11 @@ LEAST_CLAMP_OF_NODES = 9.0
 # share that a mirror along the normals sends inside, of subsurface under a light probe: a lump of 320 faces, 0.30, was
 # 2 % too dark, a ball of 8 segments, 0.23, as other balls
 MOST_LEANING_WALKS = 0.25
+# Shapes of a scene, from which on those that are alike are one, as each takes the renderer time of its own: with 15,852
+# sprinkles of a donut as one a fit of 144 x 81 pixels took 43 s of a processor, and else it was not done after 246 s
+# (docs/notebook/wild.md). Fewer: no measurement
+MANY_SHAPES = 64
+SMALL = 0.1  # metres from the origin that a shape reaches whose rays start nearer to it (the backend's `ray_starts`)
 WORLD_NOT_FINITE = "The colour or strength of the world is NaN or infinite: mend the driver or keyframe that gives it."
 LIGHT_NOT_FINITE = (
     "The place or a setting of light '{name}' is NaN or infinite: mend the driver, constraint or keyframe that gives "
@@ -133,11 +139,34 @@ def scene_files(scene: SceneData, findings: Findings) -> SceneFiles:
             children.append(bsdf_element(material, identifier, files.texture, findings, every=is_target))
     _note_shadowless(scene, findings)
     _note_leaning_walks(scene, findings)
-    for shape in scene.shapes:
+    for shape in _joined_alike(scene):
         with _finite(MATERIAL_NOT_FINITE.format(name=scene.materials[shape.bsdf].name), findings):
             children.append(_shape_element(shape, scene, files))
     files.text = scene_text(children)
     return files
+
+
+def _joined_alike(scene: SceneData) -> list[Shape]:
+    """The shapes of a scene, of many those that differ in their faces alone as one, as sprinkles and blades of grass.
+
+    Not what is fitted; what glows, as a renderer draws points on each; what light walks below, as it stays inside of
+    its shape; and what is small, as its size says where rays from it start.
+    """
+    if len(scene.shapes) < MANY_SHAPES:
+        return scene.shapes
+    fitted = {target_bsdf(number) for number in range(scene.target_count)}
+    alone = fitted | {name for name, each in scene.materials.items() if each.scattering or each.emission.any()}
+    alike: dict[object, list[Shape]] = {}
+    for shape in scene.shapes:
+        is_small = np.abs(shape.mesh.positions).max(initial=0.0) <= SMALL
+        key = shape.identifier if shape.bsdf in alone or is_small else _but_faces(shape)
+        alike.setdefault(key, []).append(shape)
+    return [replace(shapes[0], mesh=joined([shape.mesh for shape in shapes])) for shapes in alike.values()]
+
+
+def _but_faces(shape: Shape) -> tuple[object, ...]:
+    """All that the scene file says of a shape beside its faces."""
+    return shape.bsdf, tuple(_numbers(shape).items()), shape.mesh.tangents is None
 
 
 @contextmanager
@@ -206,13 +235,14 @@ def _shape_element(shape: Shape, scene: SceneData, files: SceneFiles) -> Element
     path = f"meshes/{shape.identifier}.ply"
     files.meshes[path] = shape.mesh
     element = add(plugin("shape", "ply", shape.identifier), string("filename", path), reference(shape.bsdf))
-    add(element, *_numbers(shape))
+    for name, value in _numbers(shape).items():
+        add(element, add(plugin("texture", "uniform", name=name), scalar("value", value)))
     material, exposure = scene.materials[shape.bsdf], scene.settings.exposure
     emitter = emission_element(material, exposure, files.texture)
     return element if emitter is None else add(element, emitter)
 
 
-def _numbers(shape: Shape) -> list[Element]:
+def _numbers(shape: Shape) -> dict[str, float]:
     """What the backend's transport reads (`smooth_facets`, `shadow_rays`, `camera_view`, `subsurface_walks`) and what a
     verdict leaves out (`seen_through`)."""
     numbers = {
@@ -224,11 +254,7 @@ def _numbers(shape: Shape) -> list[Element]:
         "body": float(shape.body) if shape.body else None,
         "leaning_normals": 1.0 if normals_lean(shape.mesh) else None,
     }
-    return [
-        add(plugin("texture", "uniform", name=name), scalar("value", value))
-        for name, value in numbers.items()
-        if value is not None
-    ]
+    return {name: value for name, value in numbers.items() if value is not None}
 
 
 def _hide_emitters(scene: SceneData) -> bool:

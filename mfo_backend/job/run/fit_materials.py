@@ -20,6 +20,7 @@ from ...types.status import Status
 from ...types.verdict import Verdict, worst
 from ..folder.job_folder import JobFolder, clear_outputs
 from ..folder.request import Request
+from .as_in_scene import as_in_scene
 from .graph_blender import HELD, GraphsOfMaterial, evaluated_graphs, refusal_of
 from .job_outcome import JobOutcome
 from .job_scene import load_native_code, material_notes, named, of_one_material, request_materials
@@ -117,7 +118,7 @@ def _fit(
     )  # fmt: skip
     found = []
     for (_, each), outcome, of_graph in zip(inner, together.outcomes, inside, strict=True):
-        result = outcome.result
+        result = as_in_scene(each, outcome.result)
         alone = () if result.judgement is None or result.judgement.verdict is Verdict.SAME else (ONE_CLASS,)
         result = replace(
             result, notes=(*notes, *of_graph.notes, *result.notes, *material_notes(each, result), *alone), **named(each)

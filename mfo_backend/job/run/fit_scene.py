@@ -19,6 +19,7 @@ from ...types.parameter_bounds import narrowed
 from ...types.result import FitResult
 from ..folder.job_folder import JobFolder
 from ..folder.request import Request
+from .as_in_scene import as_in_scene
 from .class_trials import Fitted, with_other_classes, with_plainer, with_plainer_glow
 from .fit_materials import fit_materials
 from .graph_blender import HELD, evaluated_graphs, refusal_of
@@ -112,7 +113,7 @@ def fit_scene(
         else:
             fitted, said = _fit_and_other_classes(job)
             notes = (*notes, *said)
-    result = fitted.result
+    result = as_in_scene(request, fitted.result)
     if request.light_paths is not None and result.model == "mitsuba_principled":
         result = with_notes(result, (_WITHOUT_LIGHT_PATHS,))
     result = replace(result, notes=(*notes, *result.notes, *material_notes(request, result)), **named(request))

@@ -26,6 +26,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...material.arrays.own_memory import own_memory
+from ..models.varying_values import SHAPE
 from ..random_numbers.even_points import even_points
 from .packed_lanes import Lanes
 from .proposal import DefensiveProposal
@@ -35,6 +36,7 @@ from .recorded_paths import LaneGroups, RecordedPaths
 # Pairs of directions, at as many places; 0.2 ms of processor time, so fewer save nothing. No measurement of its noise,
 # which is the same for all materials
 ALBEDO_LANES = 4096
+GEOMETRIC = SHAPE[0]
 LEAST_ALBEDO = 1e-4  # for a division: what a blacker target reflects shows nothing
 
 
@@ -102,6 +104,10 @@ def _albedo_lanes(paths: RecordedPaths, held: Sequence[str]) -> tuple[Lanes, Lan
     weight, nothing = (mi.Color3f(*(dr.opaque(mi.Float, n) / likely for _ in range(3))) for n in (1.0, 0.0))
     place = own_memory(np.linspace(0, paths.lanes - 1, ALBEDO_LANES).astype(np.uint32), mi.UInt32)
     values = tuple(dr.gather(type(paths.held[name]), paths.held[name], place) for name in held)
+    by_name = dict(zip(held, values, strict=True))
+    if GEOMETRIC in by_name:  # no ray comes from below a face, and normals that are bent to views have no value there
+        face = by_name[GEOMETRIC]
+        wi = dr.select(dr.dot(wi, face) < 0.0, wi - 2.0 * dr.dot(wi, face) * face, wi)
     dr.eval(wi, wo, weight, values, nothing)
     first = np.zeros(1, np.int64)
     group = LaneGroups(first, np.arange(2), first, np.array([[0, ALBEDO_LANES]]))
