@@ -6,4 +6,4 @@ It never imports bpy. Layers, from the bottom: types, scene, material, render, m
 an import may only point down (`tests/test_import_arrows.py`).
 """
 
-__version__ = "0.14.0"
+__version__ = "0.15.0"
