@@ -47,7 +47,7 @@ def judged_result(
         found = None if judgement is None else judgement.target
     elif result.errors["flip"][1] > result.errors["flip"][0]:
         found = difference_of(reference, end, mask, view)
-    if _has_moved(result) and is_worse(reference, start, found, mask, view):
+    if has_moved(result) and is_worse(reference, start, found, mask, view):
         errors = {name: (before, before) for name, (before, _) in result.errors.items()}
         result = replace(
             result, recovered=dict(result.initial), errors=errors, certainty={}, weak_combinations=(),
@@ -78,11 +78,13 @@ def judged_result(
     ), end
 
 
-def _has_moved(result: FitResult) -> bool:
-    return any(_moved(result.initial.get(name), value) for name, value in result.recovered.items())
+def has_moved(result: FitResult) -> bool:
+    """Whether a value of a result is another than at its start."""
+    return any(moved(result.initial.get(name), value) for name, value in result.recovered.items())
 
 
-def _moved(before: Value | None, after: Value) -> bool:
+def moved(before: Value | None, after: Value | NDArray[np.float64]) -> bool:
+    """Whether a value is another one, and not the same from another file."""
     return before is None or not np.allclose(before, after, rtol=FILE_ROUNDING, atol=FILE_ROUNDING)
 
 
@@ -91,7 +93,7 @@ def _said(result: FitResult, *, doubted: bool) -> dict[str, Certainty]:
     said = {}
     for name, certainty in result.certainty.items():
         level = certainty.level
-        if level is Level.NOT_VISIBLE and _moved(result.initial.get(name), result.recovered[name]):
+        if level is Level.NOT_VISIBLE and moved(result.initial.get(name), result.recovered[name]):
             level = Level.NOT_TOLD_APART
         elif level is Level.DETERMINED and doubted:
             level = Level.DOUBTFUL

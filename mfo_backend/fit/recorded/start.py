@@ -117,7 +117,8 @@ def _groups(recording: Recording) -> LaneGroups:
 
 def _starts(setting: Setting, problem: Problem, stage: Stage, values: Placed) -> list[Vector]:
     """Where two opposite starts agree, their ends; else the best nodes of the scan. All begin at these `values`."""
-    plan, table, scanned = setting.plan, setting.table, setting.scene.model.scanned
+    plan, table, scanned, course = setting.plan, setting.table, setting.scene.model.scanned, setting.course
+    residuals = course.watch(stage, problem.equations)
     starts: list[Vector] = []
     if plan.same_cost:
         evaluations = plan.agreement_evaluations if setting.sampled else plan.exact_agreement_evaluations
@@ -127,10 +128,10 @@ def _starts(setting: Setting, problem: Problem, stage: Stage, values: Placed) ->
             table, scanned, plan.same_cost, **exact,
         )  # fmt: skip
     if not starts and plan.scan:
-        nodes = scan(setting.course.watch(stage, problem.equations), table, scanned)
+        nodes = scan(residuals, table, scanned, course.should_stop)
         starts = [placed(start, values) for start in best_starts(nodes, plan.starts)]
-    begins, residuals = starts[:LOBE_BEGINS], setting.course.watch(stage, problem.equations)
+    begins = starts[:LOBE_BEGINS]
     for lobe in FURTHER_LOBES:
-        nodes = scan_lobe(residuals, table, lobe, begins)
+        nodes = scan_lobe(residuals, table, lobe, begins, course.should_stop)
         starts += [node.x for node in different_nodes(nodes, LOBE_STARTS)]
     return starts

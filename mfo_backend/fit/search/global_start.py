@@ -58,8 +58,9 @@ def scan(
     residuals: Callable[[Vector], NormalEquations],
     table: ParameterTable,
     scanned: Sequence[str],
+    should_stop: Callable[[], bool] = lambda: False,
 ) -> list[ScanNode]:
-    """All nodes of the scanned values, best first.
+    """All nodes of the scanned values, best first; those that there were when it was asked to stop.
 
     With the lobe widths held the image is nearly multilinear in the rest, so a few bounded Gauss-Newton steps from the
     middle of the box solve it; no user start is needed.
@@ -71,6 +72,8 @@ def scan(
             continue
         hold = {"metallic": METAL} if metal else {}
         for values in product(*(ROUGHNESS_NODES if name == scanned[0] else second for name in held)):
+            if should_stop():
+                break
             holding = {**hold, **dict(zip(held, values, strict=True))}
             nodes.append(ScanNode(values, metal, *_solved(residuals, table, table.begin, holding)))
     return sorted(nodes, key=lambda node: node.cost)
@@ -81,8 +84,9 @@ def scan_lobe(
     table: ParameterTable,
     lobe: Mapping[str, Sequence[float]],
     begins: Sequence[Vector],
+    should_stop: Callable[[], bool] = lambda: False,
 ) -> list[ScanNode]:
-    """All nodes of a lobe's values beside the other values of each begin, best first.
+    """All nodes of a lobe's values beside the other values of each begin, best first; fewer when asked to stop.
 
     None where the table does not have its first value, the amount of it.
     """
@@ -92,6 +96,8 @@ def scan_lobe(
     nodes = []
     for begin in begins:
         for values in product(*(lobe[name] for name in held)):
+            if should_stop():
+                break
             holding = dict(zip(held, values, strict=True))
             nodes.append(ScanNode(values, False, *_solved(residuals, table, begin, holding)))
     return sorted(nodes, key=lambda node: node.cost)

@@ -11,6 +11,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from ...fit.judge.judged_result import has_moved, moved
 from ...material.principled.mix_values import mix_values
 from ...material.principled.principled_dict import socket_value
 from ...material.principled.principled_parameters import PARAMETER_OF_SOCKET
@@ -18,8 +19,6 @@ from ...types.certainty import Level
 from ...types.parameter import Value
 from ...types.result import FitResult
 from ..folder.request import Request, request_to_json
-
-_ROUNDING = 1e-6  # float32 from file to file, as `fit.judge.judged_result` has it
 
 
 def as_in_scene(request: Request, result: FitResult) -> FitResult:
@@ -30,18 +29,18 @@ def as_in_scene(request: Request, result: FitResult) -> FitResult:
     if result.model != "blender_principled":
         return result
     initial, recovered, bounds = dict(result.initial), dict(result.recovered), dict(result.bounds)
-    is_start = all(name in initial and _equal(initial[name], value) for name, value in recovered.items())
+    is_start = not has_moved(result)
     for name, own in _own_values(request).items():
         if name not in initial or name not in bounds or name in request.fit.bounds:
             continue
         lower, upper = bounds[name]
         begin = np.clip(own, lower, upper)
-        if np.array_equal(begin, own) or not _equal(initial[name], begin):
+        if np.array_equal(begin, own) or moved(initial[name], begin):
             continue
         initial[name], sure = own, result.certainty.get(name)
         bounds[name] = min(lower, float(np.min(own))), max(upper, float(np.max(own)))
         is_kept = is_start or (sure is not None and sure.level is Level.NOT_VISIBLE)
-        if is_kept and name in recovered and _equal(recovered[name], begin):
+        if is_kept and name in recovered and not moved(recovered[name], begin):
             recovered[name] = own
     return replace(result, initial=initial, recovered=recovered, bounds=bounds)
 
@@ -57,7 +56,3 @@ def _own_values(request: Request) -> dict[str, Value]:
         for socket, content in material["sockets"].items()
         if socket in PARAMETER_OF_SOCKET and content.get("value") is not None
     } | dict({} if of_mix is None else of_mix.start)
-
-
-def _equal(first: Value | np.ndarray, second: Value | np.ndarray) -> bool:
-    return np.shape(first) == np.shape(second) and np.allclose(first, second, rtol=_ROUNDING, atol=_ROUNDING)

@@ -34,6 +34,7 @@ from .material_classes import (
     new_layers,
     other_classes,
     parameters_of,
+    values_of_classes,
     without_layers,
 )
 from .more_pictures import JobPicture, told_of_first
@@ -106,17 +107,17 @@ def fit_scene(
     if request.targets:
         return fit_materials(pictures, blender=blender, listener=listener, should_stop=should_stop)
     with evaluated_graphs(pictures, blender) as (inside,):
-        variant, notes = load_native_code(), inside.notes
+        variant, notes, tried = load_native_code(), inside.notes, frozenset[str]()
         job = _OneMaterial(pictures, _materials_of(pictures), inside.graphs, listener, should_stop)
         if request.fit.preset == "paper":
             fitted = job.fit_on_own_thread()
         else:
             fitted, said = _fit_and_other_classes(job)
-            notes = (*notes, *said)
+            notes, tried = (*notes, *said), values_of_classes(job.start)
     result = as_in_scene(request, fitted.result)
     if request.light_paths is not None and result.model == "mitsuba_principled":
         result = with_notes(result, (_WITHOUT_LIGHT_PATHS,))
-    result = replace(result, notes=(*notes, *result.notes, *material_notes(request, result)), **named(request))
+    result = replace(result, notes=(*notes, *result.notes, *material_notes(request, result, tried)), **named(request))
     return JobOutcome(result, fitted.start_image, fitted.result_image, fitted.counted, variant, fitted.sheet)
 
 

@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Collection
 from typing import Any
 
 from ...material.principled.blender_selection import ASKED_FOR, LAYERS_OF_ONE
@@ -62,9 +63,12 @@ def named(request: Request) -> dict[str, Any]:
     return {"shader": "/".join(request.target.node), "labels": dict(request.target.labels)}
 
 
-def material_notes(request: Request, result: FitResult) -> tuple[str, ...]:
-    """What of the target's material the fit does not hold or left as it was, in sentences."""
-    return (*graph_notes(request, result), *absent_notes(request, result), *held_notes(request, result))
+def material_notes(request: Request, result: FitResult, tried: Collection[str] = ()) -> tuple[str, ...]:
+    """What of the target's material the fit does not hold or left as it was, in sentences.
+
+    `tried` are names of values that fits from other classes of material have.
+    """
+    return (*graph_notes(request, result), *absent_notes(request, result, tried), *held_notes(request, result))
 
 
 def graph_notes(request: Request, result: FitResult) -> tuple[str, ...]:
@@ -88,15 +92,16 @@ def graph_notes(request: Request, result: FitResult) -> tuple[str, ...]:
     return tuple(notes)
 
 
-def absent_notes(request: Request, result: FitResult) -> tuple[str, ...]:
-    """What a fit of `all` leaves out because the material has none of it, where the material alone does not match."""
+def absent_notes(request: Request, result: FitResult, tried: Collection[str] = ()) -> tuple[str, ...]:
+    """What a fit of `all` leaves out because the material has none of it, where the material alone does not match.
+
+    Not what was `tried` from another class of material.
+    """
     material, judgement = request.materials.get(request.target.bsdf_id), result.judgement
     if material is None or request.target.labels or request.fit.parameters != "all":
         return ()
     if judgement is None or judgement.verdict is Verdict.SAME or judgement.cause is not Cause.MATERIAL:
         return ()
-    tangent = material.sockets.get("Tangent")
-    tried = {"anisotropic"} if tangent is not None and tangent.mesh and not material.leaves else set()
     names = [SOCKET_OF_PARAMETER[name] for name in ASKED_FOR if name not in {*result.recovered, *tried}]
     own = {name: material.sockets[name] for name in names if name in material.sockets}
     for leaf in material.leaves:  # a fit of `all` gives these to the fitted one alone

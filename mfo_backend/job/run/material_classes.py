@@ -153,6 +153,12 @@ def other_classes(material: Mapping[str, Any], glow: float) -> list[MaterialClas
     ]  # fmt: skip
 
 
+def values_of_classes(material: Mapping[str, Any] | None) -> frozenset[str]:
+    """Names of the values that fits from other classes have, and a fit of `all` from a material has not."""
+    classes = [] if material is None else other_classes(material, 0.0)
+    return frozenset(name for other in classes for name in other.also)
+
+
 def _has_tangents(sockets: Mapping[str, Any]) -> bool:
     """Whether the meshes hold tangents, along which nothing is stretched yet."""
     tangent = sockets.get("Tangent", {})

@@ -25,8 +25,8 @@ _WITH = {
     "absorption_density": ("absorption_density", "absorption_color"),
 }
 PLAIN = {"coat_tint": BLENDER_PRINCIPLED["coat_tint"].default}  # what shows nothing; of all others it is 0
-# Those of them that no other class of material brings (job/run/material_classes.py), anisotropy where meshes hold no
-# tangents: a user has to give them a value
+# Those of them that no other class of material brings, or not always (job/run/material_classes.py): a user has to give
+# them a value
 ASKED_FOR = ("anisotropic", "subsurface_weight")
 LAYERS_OF_ONE = ("coat_weight", "sheen_weight")  # of other shaders of a mix they are fitted where there are any
 # Without an amount of the second the first has no effect

@@ -217,6 +217,22 @@ def test_beside_each_begin_all_nodes_of_a_film_are_tried():
     assert {tuple(node.x[5:]) for node in nodes} == {node.held for node in nodes}
 
 
+def test_scans_end_when_they_are_asked_to_stop():
+    seen = []
+
+    def flat(x):
+        seen.append(x)
+        return NormalEquations(1.0, np.zeros(len(x)), np.eye(len(x)))
+
+    def after_three():
+        return len(seen) >= 3
+
+    assert len(scan(flat, TABLE, SCANNED, after_three)) <= 3
+    seen.clear()
+    assert len(scan_lobe(flat, FILMED, FILM, [FILMED.begin, FILMED.lower], after_three)) <= 3
+    assert len(seen) <= 6  # a node has four evaluations at most
+
+
 def test_without_a_film_nothing_of_one_is_tried():
     def never(x):
         raise AssertionError("no film to solve for")

@@ -43,12 +43,10 @@ def said_of_absent(
     cause: Cause | None,
     parameters: str | list[str],
     leaves: tuple[Any, ...] = (),
-    *,
-    mesh: bool = False,
+    tried: frozenset[str] = frozenset(),
 ) -> tuple[str, ...]:
     amounts = {"Anisotropic": 0.0, "Thin Film Thickness": 420.0, "Subsurface Weight": 0.0, "Metallic": 0.0}
     sockets = {name: SimpleNamespace(value=value, linked=False) for name, value in amounts.items()}
-    sockets["Tangent"] = SimpleNamespace(value=0.0, linked=False, mesh=mesh)
     request: Any = SimpleNamespace(
         materials={"target_bsdf": SimpleNamespace(sockets=sockets, leaves=leaves)},
         target=SimpleNamespace(bsdf_id="target_bsdf", labels={}), fit=SimpleNamespace(parameters=parameters),
@@ -57,7 +55,7 @@ def said_of_absent(
     result: Any = SimpleNamespace(
         model="blender_principled", judgement=judgement, recovered={"metallic": 1.0, "thin_film_thickness": 300.0}
     )
-    return absent_notes(request, result)
+    return absent_notes(request, result, tried)
 
 
 def test_what_the_material_has_none_of_is_named_where_it_does_not_match() -> None:
@@ -73,10 +71,8 @@ def test_what_the_material_has_none_of_is_named_where_it_does_not_match() -> Non
     (said,) = said_of_absent(Verdict.CLOSE, Cause.MATERIAL, "all", leaves)
     assert "(Anisotropic, Subsurface Weight, Paint/Coat Weight)" in said
     # a fit that began again from a brushed one has tried the first
-    (said,) = said_of_absent(Verdict.CLOSE, Cause.MATERIAL, "all", mesh=True)
+    (said,) = said_of_absent(Verdict.CLOSE, Cause.MATERIAL, "all", tried=frozenset({"anisotropic"}))
     assert "(Subsurface Weight)" in said
-    (said,) = said_of_absent(Verdict.CLOSE, Cause.MATERIAL, "all", leaves, mesh=True)  # a mix is tried as no other
-    assert "(Anisotropic, " in said
     assert said_of_absent(Verdict.CLOSE, Cause.LIGHT, "all") == ()
     assert said_of_absent(Verdict.SAME, None, "all") == ()
     assert said_of_absent(Verdict.CLOSE, Cause.MATERIAL, ["roughness"]) == ()

@@ -18,6 +18,7 @@ from mfo_backend.job.run.material_classes import (
     other_classes,
     parameters_of,
     value_of,
+    values_of_classes,
     with_values_of,
 )
 from mfo_backend.metrics.display.tone_mapping import DisplayView
@@ -69,6 +70,12 @@ def test_a_brushed_one_is_tried_where_the_meshes_hold_tangents():
     assert value_of(again, "anisotropic") > 0.5
     assert again["sockets"]["Tangent"]["linked"]
     assert not changed(plain, named("as rough as clay"))["sockets"]["Tangent"]["linked"]
+    assert "anisotropic" in values_of_classes(plain)
+    # of what is cut out, or a mix, no fit begins again from a brushed one
+    cut_out = of_mesh()
+    cut_out["sockets"]["Alpha"] = {"value": 0.5, "linked": False}
+    for other in (cut_out, plain | {"leaves": [{}]}, material(Anisotropic=0.0), None):
+        assert "anisotropic" not in values_of_classes(other)
     assert parameters_of(brushed, ("roughness", "ior")) == ["roughness", "anisotropic", "anisotropic_rotation"]
 
 
