@@ -70,7 +70,7 @@ def holder_of(tree: bpy.types.NodeTree, place: Place) -> tuple[Any, str]:
     KeyError, IndexError, AttributeError
         If the tree has no such place.
     """
-    node = _node(tree, place)
+    node = node_of(tree, place)
     if place.kind in TINTS:
         return tint_holder(_input(node, place.key), place.kind)
     if place.kind == INPUT:
@@ -87,7 +87,7 @@ def holder_of(tree: bpy.types.NodeTree, place: Place) -> tuple[Any, str]:
 def held(tree: bpy.types.NodeTree, place: Place) -> Value:
     """The numbers as they are kept, colours in the scene's working space and with their alpha."""
     if place.kind in TINTS:  # a look puts no node there
-        return tint_held(_input(_node(tree, place), place.key), place.kind)
+        return tint_held(_input(node_of(tree, place), place.key), place.kind)
     owner, name = holder_of(tree, place)
     value = getattr(owner, name)
     if isinstance(value, (int, float)):
@@ -103,15 +103,16 @@ def hold(tree: bpy.types.NodeTree, place: Place, value: Value) -> None:
     else:
         setattr(owner, name, value)
     if place.kind == CURVE_POINT:
-        _node(tree, place).mapping.update()
+        node_of(tree, place).mapping.update()
 
 
 def is_there(tree: bpy.types.NodeTree, place: Place) -> bool:
     """Whether the value has a node; a tint has none before it is written."""
-    return place.kind not in TINTS or tint_of(_input(_node(tree, place), place.key)) is not None
+    return place.kind not in TINTS or tint_of(_input(node_of(tree, place), place.key)) is not None
 
 
-def _node(tree: bpy.types.NodeTree, place: Place) -> bpy.types.Node:
+def node_of(tree: bpy.types.NodeTree, place: Place) -> bpy.types.Node:
+    """The node that has the value; of a tint, the one before whose input it is put."""
     for group in place.path[:-1]:
         tree = tree.nodes[group].node_tree
     return tree.nodes[place.path[-1]]

@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
@@ -10,6 +11,7 @@ from typing import Any
 import numpy as np
 
 from ..graph_values.place import Place
+from .held_pictures import take_values
 from .target import Target
 from .variant_pictures import Picture, Variant, VariantPictures, write_surface
 
@@ -49,7 +51,9 @@ def answer(request: Mapping[str, Any]) -> dict[str, Any]:
         np.save(folder / elsewhere[name], values)
 
     depths = range(int(request.get("depths", 1)))
-    surface = renders.take(variants, request["scale"], take, depths=depths, far_side=bool(request.get("far_side")))
+    key = json.dumps({name: value for name, value in request.items() if name not in ("variants", "folder")})
+    far_side = bool(request.get("far_side"))
+    surface = take_values(renders, variants, request["scale"], take, key=key, depths=depths, far_side=far_side)
     if request.get("elsewhere"):
         renders.take_elsewhere(variants[0], take_elsewhere, depths)
     return {"files": files, "elsewhere": elsewhere, **write_surface(target, surface, folder)}

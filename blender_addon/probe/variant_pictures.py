@@ -6,7 +6,7 @@ Each variant is a copy of the material's whole tree; Cycles merges what is the s
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping, Sequence, Set
+from collections.abc import Callable, Mapping, Sequence, Set
 from dataclasses import dataclass, replace
 from functools import cached_property, partial
 from pathlib import Path
@@ -53,7 +53,7 @@ LEAST_ALPHA = 1e-4  # of a sum over samples: less is nothing, and divides nothin
 
 Picture = NDArray[np.float32]
 _Found = dict[tuple[int, str] | str, Picture]  # by variant and socket; mask and position by their names
-_Take = Callable[[int, str, Picture], None]  # of a variant's number and a socket's name
+Take = Callable[[int, str, Picture], None]  # of a variant's number and a socket's name
 
 
 @dataclass(frozen=True)
@@ -105,19 +105,55 @@ class VariantPictures:
     places: Sequence[Place] = ()
 
     @cached_property
-    def _has_holes(self) -> bool:
+    def has_holes(self) -> bool:
         """Whether a shader lets light straight on, so that pictures of others may be of what it leaves."""
         return any(map(is_clear, nodes_of(self.target.material.node_tree)))
 
+    def put(self, tree: bpy.types.NodeTree, values: Sequence[Any]) -> None:
+        """Put a value at every place of a copy of the material's nodes."""
+        for place, value in zip(self.places, values, strict=True):
+            try:
+                write(tree, place, value)
+            except (KeyError, IndexError, AttributeError, StopIteration) as error:
+                raise ProbeRequestError(
+                    f"The node '{place.path[-1]}' of material '{self.target.material.name}' is not what it was when "
+                    "the fit began."
+                ) from error
+
+    def put_outputs(
+        self, tree: bpy.types.NodeTree, outputs: Mapping[str, str]
+    ) -> tuple[dict[str, str], dict[str, str]]:
+        """Put an output node of the given name on each of these sockets in such a copy, for its surface.
+
+        Returns the sockets' types, and where there are holes the output of the alpha that each was weighed with.
+        """
+        needs_closures = self.has_holes or not all(self.paths[name][-1] for name in outputs)
+        closures = ClosureTree(tree) if needs_closures else None
+        remove_outputs(tree)
+        for node in [node for node in tree.nodes if node.bl_idname == "ShaderNodeOutputMaterial"]:
+            tree.nodes.remove(node)
+        kinds = {}
+        for name, output in outputs.items():
+            *shader, socket = self.paths[name]
+            if socket:
+                kinds[name] = write_outputs(tree, shader, {socket: output})[socket]
+            else:
+                assert closures is not None
+                kinds[name] = write_weight(tree, closures, shader, output)
+        if not self.has_holes:
+            return kinds, {}
+        assert closures is not None
+        return kinds, _weigh(tree, self.paths, outputs, closures)
+
     def _outputs_of(self, variants: Sequence[Variant]) -> int:
         """How many one render of them has: an alpha of each where there are holes, mask and position."""
-        return sum(len(variant.names) + self._has_holes for variant in variants) + 2
+        return sum(len(variant.names) + self.has_holes for variant in variants) + 2
 
     def take(
         self,
         variants: Sequence[Variant],
         scale: int,
-        take: _Take,
+        take: Take,
         *,
         depths: Sequence[int] = (0,),
         far_side: bool = False,
@@ -164,7 +200,7 @@ class VariantPictures:
         variants: Sequence[Variant],
         frame: Frame,
         most: int,
-        take: _Take,
+        take: Take,
         depths: Sequence[int],
         *,
         far_side: bool,
@@ -211,15 +247,11 @@ class VariantPictures:
                 copy.node_tree.nodes.new("ShaderNodeGroup").node_tree = tree
                 if variant.cosine is not None:
                     see_from_elsewhere(tree, variant.cosine)
-                _put(tree, self.places, variant.values, material.name)
+                self.put(tree, variant.values)
                 outputs = {name: _name(k, i) for i, name in enumerate(variant.names)}
-                # of the surface that the outputs take the place of
-                closures = ClosureTree(tree) if self._has_holes or _asks_weight(self.paths, outputs) else None
-                kinds |= _put_outputs(tree, self.paths, outputs, closures)
+                own_kinds, own_alphas = self.put_outputs(tree, outputs)
+                kinds, alphas = kinds | own_kinds, alphas | own_alphas
                 wanted += [(output, kinds[name] != "VALUE") for name, output in outputs.items()]
-                if self._has_holes:
-                    assert closures is not None
-                    alphas |= _weigh(tree, self.paths, outputs, closures)
             wanted += [(output, False) for output in dict.fromkeys(alphas.values())]
             at_depths = peeled(copy.node_tree, wanted, depths[-1] + 1)
             outputs = partial(self.target.outputs, copy, frame=frame, by_pixels=by_pixels)
@@ -297,40 +329,5 @@ def _weigh(
     return found
 
 
-def _asks_weight(paths: Mapping[str, Sequence[str]], names: Iterable[str]) -> bool:
-    return not all(paths[name][-1] for name in names)
-
-
 def _name(variant: int, socket: int) -> str:
     return f"mfo {variant} {socket}"
-
-
-def _put(tree: bpy.types.NodeTree, places: Sequence[Place], values: Sequence[Any], material: str) -> None:
-    for place, value in zip(places, values, strict=True):
-        try:
-            write(tree, place, value)
-        except (KeyError, IndexError, AttributeError, StopIteration) as error:
-            raise ProbeRequestError(
-                f"The node '{place.path[-1]}' of material '{material}' is not what it was when the fit began."
-            ) from error
-
-
-def _put_outputs(
-    tree: bpy.types.NodeTree,
-    paths: Mapping[str, Sequence[str]],
-    outputs: Mapping[str, str],
-    closures: ClosureTree | None,
-) -> dict[str, str]:
-    """Put an output node of the given name on each of these sockets of a variant; returns the sockets' types."""
-    remove_outputs(tree)
-    for node in [node for node in tree.nodes if node.bl_idname == "ShaderNodeOutputMaterial"]:
-        tree.nodes.remove(node)
-    kinds = {}
-    for name, output in outputs.items():
-        *shader, socket = paths[name]
-        if socket:
-            kinds[name] = write_outputs(tree, shader, {socket: output})[socket]
-        else:
-            assert closures is not None
-            kinds[name] = write_weight(tree, closures, shader, output)
-    return kinds
